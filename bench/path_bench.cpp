@@ -17,13 +17,13 @@
 namespace stepdriver::bench {
 namespace {
 
-using machine::PathRequest;
-using machine::PathSegment;
+using motion::PathRequest;
+using motion::PathSegment;
 
 /// The plotter's: 80 microsteps/mm, 100 mm/s, 1 m/s^2.
-axis::PathAxis plotterAxis(const char* name) {
+motion::PathAxis plotterAxis(const char* name) {
   constexpr double kScale = 80'000.0;
-  axis::PathAxis axis;
+  motion::PathAxis axis;
   axis.name = name;
   axis.microsteps = 16;
   axis.steps_per_unit = kScale;
@@ -100,18 +100,18 @@ PathRequest waves(std::size_t segments) {
 void plan(benchmark::State& state, PathRequest (*make)(std::size_t), double jerk = 0.0) {
   constexpr std::size_t kSegments = 1000;
   const PathRequest request = make(kSegments);
-  std::vector<axis::PathAxis> axes;
+  std::vector<motion::PathAxis> axes;
   for (const std::string& name : request.names) {
     axes.push_back(plotterAxis(name.c_str()));
     axes.back().limits.jerk = jerk;
   }
-  const std::vector<machine::PathOrigin> origins(axes.size());
+  const std::vector<motion::PathOrigin> origins(axes.size());
   std::size_t points = 0;
   for (auto round : state) {
-    const machine::PathPlan plan = machine::planPath(request, axes, origins);
+    const motion::PathPlan plan = motion::planPath(request, axes, origins);
     points = plan.points.size();
-    const axis::PreparedTrajectory prepared(axes, plan.points,
-                                            std::vector<motion::MotionState>(axes.size()));
+    const motion::PreparedTrajectory prepared(axes, plan.points,
+                                              std::vector<motion::MotionState>(axes.size()));
     benchmark::DoNotOptimize(&prepared);
   }
   const auto rounds = static_cast<std::int64_t>(state.iterations());

@@ -87,8 +87,8 @@ void planCase(const Case& one) {
 
 /// A line of six axes to plan, from rest.
 struct Line {
-  std::vector<axis::PathAxis> axes;
-  std::vector<axis::PathStart> starts;
+  std::vector<motion::PathAxis> axes;
+  std::vector<motion::PathStart> starts;
   std::vector<double> targets;
 };
 
@@ -96,14 +96,14 @@ Line randomLine(std::mt19937_64& random) {
   Line line;
   for (const char* name : {"x", "y", "z", "a", "b", "c"}) {
     const Case one = randomCase(Kind::kFromRest, random);
-    axis::PathAxis axis;
+    motion::PathAxis axis;
     axis.name = name;
     axis.microsteps = 16;
     axis.steps_per_unit = 80'000.0;
     axis.limits = one.limits;
     axis.stop_limits = one.limits;
     line.axes.push_back(axis);
-    axis::PathStart start;
+    motion::PathStart start;
     start.motor = one.from;
     line.starts.push_back(start);
     line.targets.push_back(static_cast<double>(one.target));
@@ -113,7 +113,7 @@ Line randomLine(std::mt19937_64& random) {
 
 /// The path, and the motions of its axes.
 void planCase(const Line& line) {
-  const axis::LinePath path(line.axes, line.starts, line.targets, 0.0, 0.0);
+  const motion::LinePath path(line.axes, line.starts, line.targets, 0.0, 0.0);
   const motion::Profile profile = path.plan(0, path.begin(), 1.0);
   for (std::size_t i = 0; i < line.axes.size(); ++i) {
     benchmark::DoNotOptimize(path.profileOf(i, profile));

@@ -79,13 +79,13 @@ double waveAt(double time, double duration) {
   return kAmplitude * begun * begun * left * left * std::sin(kRate * time);
 }
 
-machine::TrajectoryRequest waveOf(int points) {
-  machine::TrajectoryRequest request;
+motion::TrajectoryRequest waveOf(int points) {
+  motion::TrajectoryRequest request;
   request.names = {"x", "y", "z"};
   request.points.reserve(static_cast<std::size_t>(points));
   const double duration = kPeriod * points;
   for (int i = 1; i <= points; ++i) {
-    axis::TrajectoryPoint point;
+    motion::TrajectoryPoint point;
     point.time = kPeriod * i;
     const double speed =
         (waveAt(point.time + 1e-4, duration) - waveAt(point.time - 1e-4, duration)) / 2e-4;
@@ -98,7 +98,7 @@ machine::TrajectoryRequest waveOf(int points) {
 
 class Preparing {
  public:
-  Preparing(machine::Machine& machine, const machine::TrajectoryRequest& request) {
+  Preparing(machine::Machine& machine, const motion::TrajectoryRequest& request) {
     for (std::thread& thread : threads_) {
       thread = std::thread([this, &machine, &request] {
         while (!ended_) {
@@ -137,7 +137,7 @@ Latency measure(const Options& options, const std::function<void(machine::Machin
   sim::Rig rig(test::Bench::rigAxes(axes));
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
   machine::Machine machine(axes, backend, clock, {});
-  const machine::TrajectoryRequest request = waveOf(options.points);
+  const motion::TrajectoryRequest request = waveOf(options.points);
   Latency latency;
   const Preparing preparing(machine, request);
   const auto begin = SteadyTime::now();

@@ -15,11 +15,11 @@
 namespace stepdriver::bench {
 namespace {
 
-using axis::PathAxis;
-using axis::PathStart;
-using axis::PreparedTrajectory;
-using axis::SharedPath;
-using axis::TrajectoryPoint;
+using motion::PathAxis;
+using motion::PathStart;
+using motion::PreparedTrajectory;
+using motion::SharedPath;
+using motion::TrajectoryPoint;
 
 constexpr double kPointEvery = 0.010;  // s
 

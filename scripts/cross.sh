@@ -226,7 +226,7 @@ quietly cross-own-build cmake --build "$build/core" -j "$jobs" --target trace_te
 # is the emulator's. Of named rooms: not the programs that aren't built, and not what takes minutes there.
 left_out='ForEachPairOfRequests|^RigSoak$'
 ((${#rooms[@]} == 0)) || left_out='_NOT_BUILT$|^RigSoak|^PlannerProperties|Random(Moves|Cubics)|HybridWait.SpinsForLess|'\
-'ContourMotion.*RandomPaths'
+'AccelerationLimitedTiming.*RandomPaths'
 # The search of several requests: fewer schedules run almost the same code.
 (cd "$cross/core" && STEPDRIVER_SCHEDULES=1000 ctest -j "$jobs" --timeout 1800 --no-tests=error --output-on-failure -E "$left_out")
 

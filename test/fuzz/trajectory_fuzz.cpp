@@ -59,8 +59,8 @@ std::vector<double> readNumbers(FuzzedDataProvider& input, std::size_t axes, dou
   return numbers;
 }
 
-machine::TrajectoryRequest readRequest(FuzzedDataProvider& input) {
-  machine::TrajectoryRequest request;
+motion::TrajectoryRequest readRequest(FuzzedDataProvider& input) {
+  motion::TrajectoryRequest request;
   request.names = {"x", "y"};
   const auto shape = input.ConsumeIntegral<std::uint8_t>();
   if (shape % 4 == 1) request.names = {"y"};
@@ -68,7 +68,7 @@ machine::TrajectoryRequest readRequest(FuzzedDataProvider& input) {
   const bool accelerations = (shape & 8U) != 0;
   double time = 0.0;
   while (input.remaining_bytes() > 0 && request.points.size() < 64) {
-    axis::TrajectoryPoint point;
+    motion::TrajectoryPoint point;
     time += std::abs(readNumber(input, 2.0));
     point.time = time;
     point.positions = readNumbers(input, request.names.size(), 0.3);
@@ -83,7 +83,7 @@ class Follower {
  public:
   explicit Follower(const std::vector<AxisConfig>& configs) : configs_(configs), bench_(configs) {}
 
-  void follow(const machine::TrajectoryRequest& request) {
+  void follow(const motion::TrajectoryRequest& request) {
     machine::CoordinatedMove move;
     try {
       move = bench_.machine->followTrajectory(request);
@@ -122,10 +122,10 @@ class Follower {
     for (const AxisConfig& config : configs_) check(config, bench_.axis(config.name).state());
   }
 
-  /// Each state is within the limits, as axis::kTrajectoryTolerance allows.
+  /// Each state is within the limits, as motion::kTrajectoryTolerance allows.
   void check(const AxisConfig& config, const axis::AxisState& state) {
     const double step = 1.0 / config.steps_per_unit;
-    const double tolerance = 1.0 + 2.0 * axis::kTrajectoryTolerance;
+    const double tolerance = 1.0 + 2.0 * motion::kTrajectoryTolerance;
     require(std::abs(state.velocity) <= config.max_speed * tolerance + step,
             fmt::format("{} moves at {} of {} m/s", config.name, state.velocity, config.max_speed));
     require(state.position >= *config.min_position - 1.01 * step &&
@@ -137,7 +137,7 @@ class Follower {
             fmt::format("{} is at {} m after {} pulses", config.name, state.position, pulses));
   }
 
-  void checkEnd(const machine::TrajectoryRequest& request, const machine::CoordinatedMove& move) {
+  void checkEnd(const motion::TrajectoryRequest& request, const machine::CoordinatedMove& move) {
     const machine::CoordinatedResult result = bench_.machine->wait(move);
     require(result.end == axis::MoveEnd::kReached,
             "an accepted trajectory is followed to its end: " + result.message);

@@ -36,13 +36,13 @@ trajectory_msgs::JointTrajectory message(const std::vector<std::string>& joints,
   return trajectory;
 }
 
-std::vector<double> timesOf(const machine::TrajectoryRequest& request) {
+std::vector<double> timesOf(const motion::TrajectoryRequest& request) {
   std::vector<double> times;
   for (const auto& point : request.points) times.push_back(point.time);
   return times;
 }
 
-void expectTimes(const machine::TrajectoryRequest& request, const std::vector<double>& times) {
+void expectTimes(const motion::TrajectoryRequest& request, const std::vector<double>& times) {
   ASSERT_EQ(request.points.size(), times.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
     EXPECT_NEAR(timesOf(request)[i], times[i], kRounding) << "point " << i;
@@ -66,7 +66,7 @@ void expectBadMessage(BadTrajectory::Kind kind, const std::string& words,
 }
 
 TEST(ReadingTrajectories, NamesTheAxesOfTheJointsInTheirOrder) {
-  const machine::TrajectoryRequest read =
+  const motion::TrajectoryRequest read =
       trajectoryRequest(message({"elbow", "shoulder"}, {1.0}), kAxes, kNow);
   EXPECT_EQ(read.names, (std::vector<std::string>{"y", "x"}));
 }
@@ -75,9 +75,9 @@ TEST(ReadingTrajectories, TakesAllThatAPointHas) {
   auto given = message({"shoulder"}, {0.5});
   given.points[0].velocities = {0.25};
   given.points[0].accelerations = {-2.0};
-  const machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  const motion::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
   ASSERT_EQ(read.points.size(), 1U);
-  const axis::TrajectoryPoint& point = read.points[0];
+  const motion::TrajectoryPoint& point = read.points[0];
   EXPECT_EQ(point.time, 0.5);
   EXPECT_EQ(point.positions, std::vector<double>{0.05});
   EXPECT_EQ(point.velocities, std::vector<double>{0.25});
@@ -96,7 +96,7 @@ TEST(ReadingTrajectories, RefusesJointsThatAreNotThereNoneAndOneTwice) {
 
 TEST(ReadingTrajectories, StartsAtOnceWithoutAStampAndLaterWithOneAhead) {
   auto given = message({"elbow"}, {0.5, 1.0});
-  machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  motion::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
   EXPECT_EQ(read.begin_in, 0.0);
   expectTimes(read, {0.5, 1.0});
   given.header.stamp = kNow + ros::Duration(0.25);
@@ -108,7 +108,7 @@ TEST(ReadingTrajectories, StartsAtOnceWithoutAStampAndLaterWithOneAhead) {
 TEST(ReadingTrajectories, ComesSoonerByWhatOfItHasGoneBy) {
   auto given = message({"elbow"}, {0.0, 0.5, 1.0});
   given.header.stamp = kNow - ros::Duration(0.2);
-  const machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  const motion::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
   EXPECT_EQ(read.begin_in, 0.0);
   expectTimes(read, {0.0, 0.3, 0.8});
 }
@@ -117,7 +117,7 @@ TEST(ReadingTrajectories, DropsPointsInThePast) {
   auto given = message({"elbow"}, {0.0, 0.5, 1.0, 1.5});
   for (std::size_t i = 0; i < 4; ++i) given.points[i].positions = {0.1 * static_cast<double>(i)};
   given.header.stamp = kNow - ros::Duration(0.75);
-  machine::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
+  motion::TrajectoryRequest read = trajectoryRequest(given, kAxes, kNow);
   expectTimes(read, {0.25, 0.75});
   EXPECT_EQ(read.points[0].positions, std::vector<double>{0.1 * 2.0});
   given.header.stamp = kNow - ros::Duration(1.0);

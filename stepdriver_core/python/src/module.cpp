@@ -96,7 +96,7 @@ py::dict planOf(const Session& session, const std::string& name, double position
 
 CoordinatedMoveHandle moveLine(const SessionPointer& session, const py::dict& positions,
                                bool relative, double velocity, double duration) {
-  machine::LineRequest request;
+  motion::LineRequest request;
   for (const machine::StreamMessage& one : messagesOf(positions, {})) {
     request.names.push_back(one.name);
     request.positions.push_back(one.value);
@@ -111,7 +111,7 @@ CoordinatedMoveHandle moveLine(const SessionPointer& session, const py::dict& po
 CoordinatedMoveHandle followPath(const SessionPointer& session, const Names& names,
                                  const py::iterable& segments, bool relative, double velocity,
                                  double tolerance, bool more_follows) {
-  const machine::PathRequest request{
+  const motion::PathRequest request{
       names, segmentsOf(segments, names), relative, velocity, tolerance, more_follows};
   return {session,
           session->run([&](OpenMachine& open) { return open.machine().followPath(request); })};
@@ -122,7 +122,7 @@ CoordinatedMoveHandle followTrajectory(const SessionPointer& session, const Name
                                        const py::object& velocities,
                                        const py::object& accelerations, bool allow_slower,
                                        double begin_in) {
-  const machine::TrajectoryRequest request{
+  const motion::TrajectoryRequest request{
       names, pointsOf(times, positions, velocities, accelerations), allow_slower, begin_in};
   return {session, session->run([&](OpenMachine& open) {
             return open.machine().followTrajectory(request);

@@ -69,13 +69,13 @@ std::vector<std::string> CoordinatedMoveHandle::names() const {
   return names;
 }
 
-machine::PathAhead CoordinatedMoveHandle::append(const py::iterable& segments,
-                                                 bool more_follows) const {
-  const machine::PathAppend request{move_.id(), segmentsOf(segments, names()), more_follows};
+motion::PathAhead CoordinatedMoveHandle::append(const py::iterable& segments,
+                                                bool more_follows) const {
+  const motion::PathAppend request{move_.id(), segmentsOf(segments, names()), more_follows};
   return session_->run([&](OpenMachine& open) { return open.machine().appendPath(request); });
 }
 
-std::optional<machine::PathAhead> CoordinatedMoveHandle::ahead() const {
+std::optional<motion::PathAhead> CoordinatedMoveHandle::ahead() const {
   return session_->run([this](OpenMachine& open) { return open.machine().pathAhead(move_.id()); });
 }
 

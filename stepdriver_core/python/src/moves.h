@@ -44,8 +44,8 @@ class CoordinatedMoveHandle {
   std::optional<machine::CoordinatedResult> wait(std::optional<double> longest) const;
   void stop() const;
 
-  machine::PathAhead append(const pybind11::iterable& segments, bool more_follows) const;
-  std::optional<machine::PathAhead> ahead() const;
+  motion::PathAhead append(const pybind11::iterable& segments, bool more_follows) const;
+  std::optional<motion::PathAhead> ahead() const;
 
  private:
   std::vector<std::string> names() const;

@@ -17,7 +17,7 @@ namespace stepdriver::python {
 namespace {
 
 namespace py = pybind11;
-using Shape = machine::PathSegment::Shape;
+using Shape = motion::PathSegment::Shape;
 
 // An int that the core doesn't count with is a number like any other: its reader says what is
 // allowed.
@@ -97,7 +97,7 @@ Shape shapeOf(const std::string& name) {
 }
 
 void readArc(const py::handle& item, const std::vector<std::string>& names,
-             machine::PathSegment& segment) {
+             motion::PathSegment& segment) {
   segment.plane = planeOf(item.attr("plane"), names);
   segment.point = pointOf(item.attr("point"));
   segment.clockwise = item.attr("clockwise").cast<bool>();
@@ -136,8 +136,8 @@ config::ConfigValue configOf(const py::handle& value, const std::string& name) {
                        ", but must be a dict, a list, a number, a string, a bool or None");
 }
 
-machine::PathSegment segmentOf(const py::handle& item, const std::vector<std::string>& names) {
-  machine::PathSegment segment;
+motion::PathSegment segmentOf(const py::handle& item, const std::vector<std::string>& names) {
+  motion::PathSegment segment;
   if (!py::hasattr(item, "shape") || !py::isinstance<py::str>(item.attr("shape"))) {
     segment.end = numbersOf(item);  // an array of numpy has a shape too
     return segment;
@@ -156,22 +156,22 @@ machine::PathSegment segmentOf(const py::handle& item, const std::vector<std::st
   return segment;
 }
 
-std::vector<machine::PathSegment> segmentsOf(const py::iterable& items,
-                                             const std::vector<std::string>& names) {
-  std::vector<machine::PathSegment> segments;
+std::vector<motion::PathSegment> segmentsOf(const py::iterable& items,
+                                            const std::vector<std::string>& names) {
+  std::vector<motion::PathSegment> segments;
   for (const py::handle item : items) segments.push_back(segmentOf(item, names));
   return segments;
 }
 
-std::vector<axis::TrajectoryPoint> pointsOf(const py::handle& times, const py::handle& positions,
-                                            const py::handle& velocities,
-                                            const py::handle& accelerations) {
+std::vector<motion::TrajectoryPoint> pointsOf(const py::handle& times, const py::handle& positions,
+                                              const py::handle& velocities,
+                                              const py::handle& accelerations) {
   const std::vector<double> at = numbersOf(times);
   const Rows places = rowsOf("positions", positions, at.size());
   const Rows speeds = velocities.is_none() ? Rows() : rowsOf("velocities", velocities, at.size());
   const Rows changes =
       accelerations.is_none() ? Rows() : rowsOf("accelerations", accelerations, at.size());
-  std::vector<axis::TrajectoryPoint> points(at.size());
+  std::vector<motion::TrajectoryPoint> points(at.size());
   for (std::size_t i = 0; i < at.size(); ++i) {
     points[i].time = at[i];
     points[i].positions = places[i];

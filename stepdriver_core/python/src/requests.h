@@ -24,17 +24,17 @@ config::ConfigValue configOf(const pybind11::handle& value, const std::string& n
 
 /// @param item a PathSegment of paths.py, or a sequence of numbers: a line to there.
 /// @param names of the axes of the path: the first two are the plane of an arc that names no plane.
-machine::PathSegment segmentOf(const pybind11::handle& item, const std::vector<std::string>& names);
-std::vector<machine::PathSegment> segmentsOf(const pybind11::iterable& items,
-                                             const std::vector<std::string>& names);
+motion::PathSegment segmentOf(const pybind11::handle& item, const std::vector<std::string>& names);
+std::vector<motion::PathSegment> segmentsOf(const pybind11::iterable& items,
+                                            const std::vector<std::string>& names);
 
 /// @param times [s]
 /// @param positions, velocities, accelerations a row of numbers for each time; the last two may be
 /// None.
-std::vector<axis::TrajectoryPoint> pointsOf(const pybind11::handle& times,
-                                            const pybind11::handle& positions,
-                                            const pybind11::handle& velocities,
-                                            const pybind11::handle& accelerations);
+std::vector<motion::TrajectoryPoint> pointsOf(const pybind11::handle& times,
+                                              const pybind11::handle& positions,
+                                              const pybind11::handle& velocities,
+                                              const pybind11::handle& accelerations);
 
 /// @param values [unit or unit/s] by the name of the axis.
 /// @param since AxisState::stops by the name of the axis, for those that are checked.

@@ -97,7 +97,7 @@ py::dict valueOf(const machine::CoordinatedResult& result) {
                   "positions"_a = result.positions, "duration"_a = result.duration);
 }
 
-py::dict valueOf(const machine::PathAhead& ahead) {
+py::dict valueOf(const motion::PathAhead& ahead) {
   return py::dict("segments"_a = ahead.segments, "room"_a = ahead.room, "time"_a = ahead.time,
                   "passed"_a = ahead.passed, "more_follows"_a = ahead.more_follows,
                   "targets"_a = ahead.targets);

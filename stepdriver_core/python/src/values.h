@@ -18,7 +18,7 @@ pybind11::dict valueOf(const axis::MoveResult& result);
 pybind11::dict valueOf(const axis::HomingResult& result);
 pybind11::dict valueOf(const axis::MovePlan& plan);
 pybind11::dict valueOf(const machine::CoordinatedResult& result);
-pybind11::dict valueOf(const machine::PathAhead& ahead);
+pybind11::dict valueOf(const motion::PathAhead& ahead);
 pybind11::dict valueOf(const machine::EngineFigures& figures);
 pybind11::dict valueOf(const sim::RigAxisReport& report);
 

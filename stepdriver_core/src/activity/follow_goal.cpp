@@ -16,8 +16,9 @@ std::vector<axis::AxisModel*> axesOf(const std::vector<Order>& orders) {
   return axes;
 }
 
-std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes, std::int64_t at) {
-  std::vector<axis::PathStart> starts;
+std::vector<motion::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes,
+                                        std::int64_t at) {
+  std::vector<motion::PathStart> starts;
   starts.reserve(axes.size());
   for (const axis::AxisModel* axis : axes) starts.push_back(axis->pathStart(at));
   return starts;
@@ -93,17 +94,17 @@ void FollowLine::check() const {
   }
 }
 
-const std::shared_ptr<const axis::LinePath>& FollowLine::linePath() {
+const std::shared_ptr<const motion::LinePath>& FollowLine::linePath() {
   std::vector<double> targets;
-  std::vector<axis::PathAxis> facts;
+  std::vector<motion::PathAxis> facts;
   for (const Order& order : orders_) {
     targets.push_back(order.goal.end(*order.axis));
     facts.push_back(order.axis->pathAxis());
   }
-  const std::vector<axis::PathStart> starts = startsOf(axes(), 0);
+  const std::vector<motion::PathStart> starts = startsOf(axes(), 0);
   if (!path_ || !path_->isOf(facts, starts)) {
-    path_ = std::make_shared<const axis::LinePath>(std::move(facts), starts, targets, velocity_,
-                                                   duration_);
+    path_ = std::make_shared<const motion::LinePath>(std::move(facts), starts, targets, velocity_,
+                                                     duration_);
   }
   return path_;
 }
@@ -151,7 +152,7 @@ Steps FollowLine::takeUp(const Order& order) {
 Steps FollowLine::followLine() {
   check();
   const auto join =
-      [this, path = linePath()](std::int64_t at) -> std::shared_ptr<const axis::SharedPath> {
+      [this, path = linePath()](std::int64_t at) -> std::shared_ptr<const motion::SharedPath> {
     path->requireStart(startsOf(axes(), at));
     return {path};
   };

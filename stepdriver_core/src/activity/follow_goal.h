@@ -44,7 +44,7 @@ class FollowGoal : public Script {
 class FollowLine : public Script {
  public:
   /// @param targets [microsteps] of the joints.
-  /// @param velocity, duration see machine::LineRequest.
+  /// @param velocity, duration see motion::LineRequest.
   FollowLine(Context& context, std::vector<Order> orders, double velocity, double duration,
              SharedCall call);
 
@@ -58,18 +58,18 @@ class FollowLine : public Script {
   /// take up its backlash, or if its limits have changed.
   ///
   /// @throw Refused if the limits don't allow its velocity or its duration.
-  const std::shared_ptr<const axis::LinePath>& linePath();
+  const std::shared_ptr<const motion::LinePath>& linePath();
   Steps takeUp(const Order& order);
   Steps followLine();
 
   std::vector<Order> orders_;
   const double velocity_;
   const double duration_;
-  std::shared_ptr<const axis::LinePath> path_;  // the last one
+  std::shared_ptr<const motion::LinePath> path_;  // the last one
 };
 
 /// The states of axes at a motion time.
-std::vector<axis::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes, std::int64_t at);
+std::vector<motion::PathStart> startsOf(const std::vector<axis::AxisModel*>& axes, std::int64_t at);
 
 /// The axes of orders.
 std::vector<axis::AxisModel*> axesOf(const std::vector<Order>& orders);

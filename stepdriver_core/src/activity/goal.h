@@ -78,12 +78,12 @@ struct Goal {
 };
 
 /// Makes the shared path of axes that are taken over at a motion time. @throw Refused
-using JoinPath = std::function<std::shared_ptr<const axis::SharedPath>(std::int64_t at)>;
+using JoinPath = std::function<std::shared_ptr<const motion::SharedPath>(std::int64_t at)>;
 
 /// A path that continues the one that axes follow.
 struct Extension {
-  std::shared_ptr<const axis::SharedPath> of;  ///< the path that it continues
-  std::shared_ptr<const axis::SharedPath> path;
+  std::shared_ptr<const motion::SharedPath> of;  ///< the path that it continues
+  std::shared_ptr<const motion::SharedPath> path;
   /// Positions on both paths between which they are the same. Before that, the new one isn't known.
   motion::DoubleDouble same_from;
   motion::DoubleDouble same_until;

@@ -98,7 +98,7 @@ void reportEnd(axis::AxisModel& axis, const Goal& goal, axis::MoveResult result)
   const bool along_path = goal.kind == Goal::Kind::kTogether || goal.path_limits.acceleration > 0.0;
   if (along_path) {
     axis.ended_path =
-        std::make_shared<const axis::EndedPath>(axis::EndedPath{goal.move, result.message});
+        std::make_shared<const motion::EndedPath>(motion::EndedPath{goal.move, result.message});
   }
   if (goal.outcome) goal.outcome->set(std::move(result));
 }
@@ -170,7 +170,7 @@ std::shared_ptr<const motion::Profile> MotionExecution::planPath(std::int64_t at
     follow({join_(at), course_.targets});
     return shared(course_.path->plan(at, course_.path->begin(), factor));
   }
-  const axis::SharedPath& along = *course_.path;
+  const motion::SharedPath& along = *course_.path;
   if (!anyMoves()) return shared(along.plan(at, along.restart(path_->endPosition()), factor));
   const motion::MotionState from = path_->stateAt(at);
   return shared(slowsDown() ? along.planStop(at, from) : along.plan(at, from, factor));
@@ -402,7 +402,7 @@ Failure MotionExecution::noContinuation() const {
   return {
       Failure::Kind::kRefused,
       axis.name() + ": the path doesn't continue: " +
-          (why_.text.empty() ? axis::howItEnded(axis.ended_path.get(), orders_.front().goal.move)
+          (why_.text.empty() ? motion::howItEnded(axis.ended_path.get(), orders_.front().goal.move)
                              : why_.text)};
 }
 

@@ -67,7 +67,7 @@ class MotionExecution {
   ///   new one takes over.
   void extend(Extension extension, const SharedCall& call);
   /// The path that the axes follow; nullptr if they don't, or not yet.
-  std::shared_ptr<const axis::SharedPath> sharedPath() const { return course_.path; }
+  std::shared_ptr<const motion::SharedPath> sharedPath() const { return course_.path; }
   /// The motion along it that was ordered last.
   std::shared_ptr<const motion::Profile> motionAlong() const { return path_; }
 
@@ -98,7 +98,7 @@ class MotionExecution {
 
   /// The shared path and its end.
   struct Course {
-    std::shared_ptr<const axis::SharedPath> path;
+    std::shared_ptr<const motion::SharedPath> path;
     std::vector<double> targets;  // [microsteps] of each joint
   };
 

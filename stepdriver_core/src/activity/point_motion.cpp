@@ -63,7 +63,7 @@ motion::Plan planToCount(const axis::AxisModel& axis, const Goal& goal,
 motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
                       const motion::MotionState& from, std::int64_t at,
                       const motion::MotionLimits& within) {
-  return axis::planBetween(goal.between(axis), from, [&](const motion::MotionState& seen) {
+  return motion::planBetween(goal.between(axis), from, [&](const motion::MotionState& seen) {
     return planToCount(axis, goal, seen, at, within);
   });
 }
@@ -73,7 +73,7 @@ double secondsOf(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 // The way on which the motions under way lead the motor until another one takes over.
 struct WayUntil {
   double from = 0.0;  // [microsteps] its place now
-  motion::Extent extent;
+  motion::PositionRange extent;
 };
 
 WayUntil wayUntil(const axis::AxisModel& axis, std::int64_t now, std::int64_t at) {
@@ -92,7 +92,7 @@ WayUntil wayUntil(const axis::AxisModel& axis, std::int64_t now, std::int64_t at
     const std::int64_t begin = std::max(now - late, profile.startNs());
     const std::int64_t end = std::min(until, profile.endNs());
     if (begin >= end) continue;
-    const motion::Extent ahead = motion::extentOf(motion::part(
+    const motion::PositionRange ahead = motion::positionRangeOf(motion::part(
         profile, secondsOf(begin - profile.startNs()), secondsOf(end - profile.startNs())));
     if (!std::exchange(any, true)) way.extent = ahead;
     way.extent.lowest = std::min(way.extent.lowest, ahead.lowest);
@@ -110,9 +110,9 @@ motion::Plan ofJoint(const axis::AxisModel& axis, const Goal& goal, std::int64_t
   if (goal.kind != Goal::Kind::kMove || goal.of_motor || !axis.moving()) return plan;
   const WayUntil before = wayUntil(axis, now, plan.profile.startNs());
   const double joint = axis.jointAt(before.from);
-  const motion::Extent after = motion::extentOf(plan.profile);
+  const motion::PositionRange after = motion::positionRangeOf(plan.profile);
   const auto backlash = static_cast<double>(axis.backlash());
-  const motion::Extent reached{
+  const motion::PositionRange reached{
       std::min({joint, before.extent.lowest, after.lowest}),
       std::max({joint, before.extent.highest - backlash, after.highest - backlash})};
   plan.overshoot = motion::overshootOf(reached, joint, goal.end(axis));
@@ -123,7 +123,7 @@ motion::Plan ofJoint(const axis::AxisModel& axis, const Goal& goal, std::int64_t
 double beyondLimits(const axis::AxisModel& axis, const Goal& goal, const motion::Plan& plan) {
   if (goal.of_motor) return 0.0;  // no soft limit applies
   double beyond = 0.0;
-  const motion::Extent extent = motion::extentOf(plan.profile);
+  const motion::PositionRange extent = motion::positionRangeOf(plan.profile);
   if (const auto& lowest = axis.config.min_position) {
     beyond = std::max(beyond, axis.countOf(*lowest) - extent.lowest);
   }
@@ -178,11 +178,11 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t no
   };
   const auto best_within = [&]() -> GoalPlan {
     if (areTheSame(before, within)) return plan_within(within);
-    const motion::LevelOff level_off(at, from, within, before.jerk);
+    const motion::AccelerationRampDown ramp_down(at, from, within, before.jerk);
     GoalPlan changed{ofJoint(axis, goal, now,
-                             level_off.followedBy(
-                                 planFrom(axis, goal, level_off.end(), level_off.endNs(), within))),
-                     level_off.isNeeded() ? before : within, slows_ns};
+                             ramp_down.followedBy(
+                                 planFrom(axis, goal, ramp_down.end(), ramp_down.endNs(), within))),
+                     ramp_down.isNeeded() ? before : within, slows_ns};
     const double excess = excessOf(axis, goal, changed.plan);
     if (excess <= motion::kNoStep) return changed;
     GoalPlan kept = plan_within(before);
@@ -210,10 +210,10 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
   const std::int64_t count = motion::restingCount(end.value());
   const double between = axis.sharers().empty() ? 0.0 : end.value() - static_cast<double>(count);
-  return axis::planBetween(between, from,
-                           [&](const motion::MotionState& seen) {
-                             return motion::Plan{motion::planStop(at, seen, stopping, count)};
-                           })
+  return motion::planBetween(between, from,
+                             [&](const motion::MotionState& seen) {
+                               return motion::Plan{motion::planStop(at, seen, stopping, count)};
+                             })
       .profile;
 }
 

@@ -67,7 +67,7 @@ Schedule::Source Schedule::sourceOf(const Entry& entry, const axis::AxisModel& a
 
 void Schedule::plan(Entry& entry) const {
   const LaterMotion& motion = entry.motion;
-  std::vector<axis::PathStart> starts;
+  std::vector<motion::PathStart> starts;
   std::vector<Source> from;
   for (const Order& order : motion.orders) {
     const Entry* other = before(entry, *order.axis);

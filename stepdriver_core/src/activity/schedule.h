@@ -18,14 +18,14 @@ namespace stepdriver::activity {
 
 /// Makes the shared path of axes from their states at its beginning. @throw Refused
 using JoinStarts =
-    std::function<std::shared_ptr<const axis::SharedPath>(const std::vector<axis::PathStart>&)>;
+    std::function<std::shared_ptr<const motion::SharedPath>(const std::vector<motion::PathStart>&)>;
 
 /// A motion of several axes along one path that begins at a motion time ahead.
 struct LaterMotion {
   std::vector<Order> orders;
   JoinStarts join;
-  std::vector<axis::PathAxis> facts;  ///< from which the path was prepared, by order
-  std::int64_t begins_ns = 0;         ///< motion time
+  std::vector<motion::PathAxis> facts;  ///< from which the path was prepared, by order
+  std::int64_t begins_ns = 0;           ///< motion time
 };
 
 /// Motions that were accepted and begin later. Until then they own nothing: their axes continue

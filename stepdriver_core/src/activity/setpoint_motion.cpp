@@ -30,10 +30,10 @@ void append(std::vector<motion::Piece>& pieces, const motion::Profile& more) {
   for (const motion::Piece& piece : more.pieces()) pieces.push_back(piece);
 }
 
-// @param between see axis::planBetween().
+// @param between see motion::planBetween().
 bool isWithinSoftLimits(const axis::AxisModel& axis, const motion::Profile& profile,
                         double between) {
-  const motion::Extent extent = motion::extentOf(profile);
+  const motion::PositionRange extent = motion::positionRangeOf(profile);
   const auto& lowest = axis.config.min_position;
   const auto& highest = axis.config.max_position;
   const double slack = static_cast<double>(axis.backlash()) - between;
@@ -65,11 +65,11 @@ motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
                                                : *goal.target;
   if (velocity == 0.0) return motion::planMove(at, from, target, within).profile;
   const std::int64_t taken_up = target - *goal.target;
-  const motion::MovingPoint point{
+  const motion::MovingTarget point{
       motion::DoubleDouble(wanted.position - goal.between(axis) + static_cast<double>(taken_up)) +
           velocity * seconds(at - wanted.reach_ns),
       velocity};
-  std::vector<motion::Piece> pieces = motion::joinPoint(from, point, within, wanted.period);
+  std::vector<motion::Piece> pieces = motion::planIntercept(from, point, within, wanted.period);
   // If it hasn't caught up with the point by then, it returns all the same: the stream may have
   // ended.
   motion::DoubleDouble left = seconds(wanted.return_ns - at);

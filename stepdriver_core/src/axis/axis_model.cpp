@@ -54,8 +54,8 @@ double AxisModel::jointAt(double motor_count) const {
   return motor_count - std::clamp(slack, 0.0, static_cast<double>(backlash()));
 }
 
-PathAxis AxisModel::pathAxis() const {
-  PathAxis facts;
+motion::PathAxis AxisModel::pathAxis() const {
+  motion::PathAxis facts;
   facts.name = config.name;
   facts.kind = config.kind;
   facts.shares_motors = !sharers_.empty();
@@ -75,8 +75,8 @@ PathAxis AxisModel::pathAxis() const {
   return facts;
 }
 
-PathStart AxisModel::pathStart(std::int64_t at) const {
-  PathStart start;
+motion::PathStart AxisModel::pathStart(std::int64_t at) const {
+  motion::PathStart start;
   start.motor = motor.stateAt(at);
   const double count = start.motor.position.value();
   start.slack = count - jointAt(count);
@@ -84,13 +84,13 @@ PathStart AxisModel::pathStart(std::int64_t at) const {
   return start;
 }
 
-PathStart AxisModel::laterPathStart(std::int64_t at) const {
+motion::PathStart AxisModel::laterPathStart(std::int64_t at) const {
   const motor::Motion* latest = motor.motions().latest();
   return latest != nullptr ? laterPathStart(at, *latest->planned.plan()) : pathStart(at);
 }
 
-PathStart AxisModel::laterPathStart(std::int64_t at, const motion::Profile& planned) const {
-  PathStart start;
+motion::PathStart AxisModel::laterPathStart(std::int64_t at, const motion::Profile& planned) const {
+  motion::PathStart start;
   start.motor = planned.stateAt(at);
   const double count = start.motor.position.value();
   start.slack = motion::slackAt(planned, at, backlash()).value_or(count - jointAt(count));

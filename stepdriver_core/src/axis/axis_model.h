@@ -42,7 +42,7 @@ class AxisModel {
   motor::Motor motor;
   Position position;
   Fault fault;
-  SetpointStream setpoints;
+  motion::SetpointStream setpoints;
   const MachineMode& mode;
   const InputLevels& inputs;
   const LineNames& lines;
@@ -90,13 +90,13 @@ class AxisModel {
 
   /// @name For paths of several axes
   /// @{
-  PathAxis pathAxis() const;
+  motion::PathAxis pathAxis() const;
   /// Its state at a motion time.
-  PathStart pathStart(std::int64_t at) const;
+  motion::PathStart pathStart(std::int64_t at) const;
   /// The state at a motion time that may be far ahead, if its motion continues as planned.
-  PathStart laterPathStart(std::int64_t at) const;
+  motion::PathStart laterPathStart(std::int64_t at) const;
   /// The same at the end of, or during, another motion of the motor before that.
-  PathStart laterPathStart(std::int64_t at, const motion::Profile& planned) const;
+  motion::PathStart laterPathStart(std::int64_t at, const motion::Profile& planned) const;
   /// @}
 
   /// @name Limits
@@ -212,7 +212,7 @@ class AxisModel {
   }
 
   /// The last path of several axes that it has followed to an end; nullptr if there is none.
-  std::shared_ptr<const EndedPath> ended_path;
+  std::shared_ptr<const motion::EndedPath> ended_path;
   /// Clock time at which its last activity ended.
   pulse::Nanoseconds rest_since = 0;
   /// How often something stopped it, other than the end of its motion.

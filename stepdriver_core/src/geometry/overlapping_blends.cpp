@@ -21,14 +21,14 @@ double roundingAt(double y) {
 
 }  // namespace
 
-void GentleCorners::append(double length, double turn, double distance, double tolerance,
-                           bool fixed, double kept) {
+void OverlappingBlends::append(double length, double turn, double distance, double tolerance,
+                               bool fixed, double kept) {
   const double before = corners_.empty() ? 0.0 : corners_.back().place;
   if (kept > 0.0) begin_ = std::max(begin_, before + kept);
   corners_.push_back({before + length, turn, distance, distance, tolerance, begin_, fixed});
 }
 
-std::vector<double> GentleCorners::widened() {
+std::vector<double> OverlappingBlends::widened() {
   end_ += corners_.back().place;
   yieldToFixed();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
@@ -44,15 +44,15 @@ std::vector<double> GentleCorners::widened() {
   return distances;
 }
 
-std::size_t GentleCorners::firstNear(std::size_t corner) const {
+std::size_t OverlappingBlends::firstNear(std::size_t corner) const {
   return corner - std::min(corner, kMostNeighbours);
 }
 
-std::size_t GentleCorners::lastNear(std::size_t corner) const {
+std::size_t OverlappingBlends::lastNear(std::size_t corner) const {
   return std::min(corner + kMostNeighbours, corners_.size() - 1);
 }
 
-double GentleCorners::turnsWithin(std::size_t index, double distance) const {
+double OverlappingBlends::turnsWithin(std::size_t index, double distance) const {
   double turns = 0.0;
   for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
     if (std::abs(corners_[i].place - corners_[index].place) < distance) turns += corners_[i].turn;
@@ -60,7 +60,7 @@ double GentleCorners::turnsWithin(std::size_t index, double distance) const {
   return turns;
 }
 
-void GentleCorners::yieldToFixed() {
+void OverlappingBlends::yieldToFixed() {
   for (std::size_t k = 0; k < corners_.size(); ++k) {
     if (!corners_[k].fixed || corners_[k].distance == 0.0) continue;
     const Corner& fixed = corners_[k];
@@ -87,7 +87,7 @@ void GentleCorners::yieldToFixed() {
   }
 }
 
-bool GentleCorners::allows(std::size_t index, double distance) const {
+bool OverlappingBlends::allows(std::size_t index, double distance) const {
   const Corner& corner = corners_[index];
   double deviation = 0.0;
   for (std::size_t i = firstNear(index); i <= lastNear(index); ++i) {
@@ -97,7 +97,7 @@ bool GentleCorners::allows(std::size_t index, double distance) const {
   return turnsWithin(index, 2.0 * distance) <= kMostTurning && deviation <= corner.tolerance;
 }
 
-void GentleCorners::widen(std::size_t index) {
+void OverlappingBlends::widen(std::size_t index) {
   Corner& corner = corners_[index];
   if (corner.turn == 0.0 || corner.fixed) return;
   // Twice the distance is within the neighbours that are counted.
@@ -116,7 +116,7 @@ void GentleCorners::widen(std::size_t index) {
   corner.distance = low;
 }
 
-bool GentleCorners::narrow() {
+bool OverlappingBlends::narrow() {
   bool fits = true;
   std::vector<double> factors(corners_.size(), 1.0);
   for (std::size_t k = 0; k < corners_.size(); ++k) {

@@ -5,14 +5,14 @@
 
 namespace stepdriver::motion {
 
-/// The distance of a corner from its rounding, m(0)/d, for a shift of 1: see Contour.
+/// The distance of a corner from its rounding, m(0)/d, for a shift of 1: see Path.
 constexpr double kMidRounding = 3.0 / 8.0;
 
-/// Corners of lines, one after the other, whose roundings may overlap, see Contour.
-class GentleCorners {
+/// Corners of lines, one after the other, whose roundings may overlap, see Path.
+class OverlappingBlends {
  public:
   /// @param begin [unit] of the first line, and `end` of the last one: no rounding is beyond them.
-  GentleCorners(double begin, double end) : begin_(begin), end_(end) {}
+  OverlappingBlends(double begin, double end) : begin_(begin), end_(end) {}
 
   /// @param length of the line before it. @param turn sin(turn/2). @param distance of its rounding
   ///   if it overlaps no other one. @param fixed its rounding can't be changed. @param kept [unit]

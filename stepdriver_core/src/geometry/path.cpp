@@ -49,7 +49,7 @@ double distanceOf(const std::vector<double>& a, const std::vector<double>& b) {
 // length or less. If both are at their ends, the curve is a straight line, and another one of its
 // parameters has them at thirds.
 std::pair<std::vector<double>, std::vector<double>> awayFromEnds(const std::vector<double>& from,
-                                                                 const ContourSegment& given,
+                                                                 const CurveSegment& given,
                                                                  double length) {
   const auto is_near = [&](const std::vector<double>& a, const std::vector<double>& b) {
     return distanceOf(a, b) < length;
@@ -101,7 +101,7 @@ double leastRate(const std::vector<double>& powers, std::size_t axes) {
 }
 
 // The jump of p'' between two segments, for parameters with |p'| = 1.
-std::vector<double> jumpOf(const ContourPoint& in, double rate_in, const ContourPoint& out,
+std::vector<double> jumpOf(const PathPoint& in, double rate_in, const PathPoint& out,
                            double rate_out) {
   std::vector<double> jump;
   jump.reserve(in.second.size());
@@ -112,8 +112,8 @@ std::vector<double> jumpOf(const ContourPoint& in, double rate_in, const Contour
 }
 
 // The size of the part of a jump that changes the curvature: the one across the mean direction.
-double acrossOf(const std::vector<double>& jump, const ContourPoint& in, double rate_in,
-                const ContourPoint& out, double rate_out) {
+double acrossOf(const std::vector<double>& jump, const PathPoint& in, double rate_in,
+                const PathPoint& out, double rate_out) {
   double along = 0.0;
   double square = 0.0;
   for (std::size_t i = 0; i < jump.size(); ++i) {
@@ -132,8 +132,8 @@ double acrossOf(const std::vector<double>& jump, const ContourPoint& in, double 
 
 }  // namespace
 
-Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& segments,
-                 double resolution, Continuity continuity, bool continues)
+Path::Path(std::vector<double> start, const std::vector<CurveSegment>& segments, double resolution,
+           Continuity continuity, bool continues)
     : start_(std::move(start)), resolution_(resolution) {
   segments_.reserve(segments.size());
   for (std::size_t i = 0; i < segments.size(); ++i) {
@@ -146,13 +146,12 @@ Contour::Contour(std::vector<double> start, const std::vector<ContourSegment>& s
   widen(segments, continues);
 }
 
-Contour::Segment Contour::placed(const std::vector<double>& from,
-                                 const ContourSegment& given) const {
+Path::Segment Path::placed(const std::vector<double>& from, const CurveSegment& given) const {
   Segment segment;
   segment.shape = given.shape;
   segment.speed = given.speed;
   segment.measured = given.measured;
-  if (given.shape == ContourSegment::Shape::kBezier) {
+  if (given.shape == CurveSegment::Shape::kBezier) {
     segment.powers.resize(4 * axes());
     const auto [control1, control2] = awayFromEnds(from, given, kHandle * resolution_);
     double handles = 0.0;
@@ -181,7 +180,7 @@ Contour::Segment Contour::placed(const std::vector<double>& from,
       segment.powers[2 * i + 1] = given.end[i] - from[i];
     }
   }
-  if (given.shape == ContourSegment::Shape::kArc) {
+  if (given.shape == CurveSegment::Shape::kArc) {
     segment.plane = given.plane;
     segment.centre = given.centre;
     segment.angle = given.angle;
@@ -199,15 +198,15 @@ Contour::Segment Contour::placed(const std::vector<double>& from,
 
 // [1/unit] The largest |p''| of the half of a segment next to a corner, for a parameter with which
 // |p'| = 1 at the corner.
-double Contour::sharpest(const Segment& segment, double rate) const {
+double Path::sharpest(const Segment& segment, double rate) const {
   switch (segment.shape) {
-    case ContourSegment::Shape::kLine:
+    case CurveSegment::Shape::kLine:
       return 0.0;
-    case ContourSegment::Shape::kArc:
+    case CurveSegment::Shape::kArc:
       return ((segment.radius + std::max(0.0, segment.growth)) * std::abs(segment.angle) +
               2.0 * std::abs(segment.growth)) *
              std::abs(segment.angle) / (rate * rate);
-    case ContourSegment::Shape::kBezier: {
+    case CurveSegment::Shape::kBezier: {
       // The second derivative is linear: largest at an end.
       double begin = 0.0;
       double end = 0.0;
@@ -222,11 +221,11 @@ double Contour::sharpest(const Segment& segment, double rate) const {
   return 0.0;
 }
 
-void Contour::round(std::size_t corner, const ContourSegment& given, Continuity continuity) {
+void Path::round(std::size_t corner, const CurveSegment& given, Continuity continuity) {
   Segment& before = segments_[corner];
   Segment& after = segments_[corner + 1];
-  ContourPoint in;
-  ContourPoint out;
+  PathPoint in;
+  PathPoint out;
   evaluateGiven(corner, 1.0, in);
   evaluateGiven(corner + 1, 0.0, out);
   before.end.rate = norm(in.first);
@@ -268,18 +267,18 @@ void Contour::round(std::size_t corner, const ContourSegment& given, Continuity 
   before.end.jump = after.begin.jump = std::move(jump);
 }
 
-Contour Contour::part(std::size_t first, std::size_t last) const {
-  ContourPoint begin;
+Path Path::part(std::size_t first, std::size_t last) const {
+  PathPoint begin;
   evaluateGiven(first, 0.0, begin);
-  Contour made(std::move(begin.position), {}, resolution_);
+  Path made(std::move(begin.position), {}, resolution_);
   made.segments_.assign(segments_.begin() + static_cast<std::ptrdiff_t>(first),
                         segments_.begin() + static_cast<std::ptrdiff_t>(last) + 1);
   made.open_ = {open_.segment - std::min(open_.segment, first), open_.parameter};
   return made;
 }
 
-Contour Contour::withStops(const std::vector<std::size_t>& corners) const {
-  Contour made(*this);
+Path Path::withStops(const std::vector<std::size_t>& corners) const {
+  Path made(*this);
   for (const std::size_t corner : corners) {
     made.segments_[corner].stops = true;
     made.segments_[corner].end.blend = made.segments_[corner + 1].begin.blend = 0.0;
@@ -287,7 +286,7 @@ Contour Contour::withStops(const std::vector<std::size_t>& corners) const {
   return made;
 }
 
-bool Contour::isSeparate(std::size_t corner) const {
+bool Path::isSeparate(std::size_t corner) const {
   const Segment& before = segments_[corner];
   const Segment& after = segments_[corner + 1];
   const auto reaches = [](const Segment& segment, double place) {
@@ -300,14 +299,14 @@ bool Contour::isSeparate(std::size_t corner) const {
          !reaches(before, before.end.rate) && !reaches(after, 0.0);
 }
 
-bool Contour::isGentle(std::size_t corner) const {
+bool Path::isGentle(std::size_t corner) const {
   const Segment& before = segments_[corner];
   return isLine(corner) && isLine(corner + 1) && !before.stops &&
          norm(before.end.shift) <= std::sin(kGentle / 2.0);
 }
 
 // Lets the roundings of neighbouring gentle corners overlap.
-void Contour::widen(const std::vector<ContourSegment>& given, bool continues) {
+void Path::widen(const std::vector<CurveSegment>& given, bool continues) {
   for (std::size_t first = 0; first + 1 < size(); ++first) {
     giveWay(first);
     if (!isGentle(first)) continue;
@@ -316,8 +315,8 @@ void Contour::widen(const std::vector<ContourSegment>& given, bool continues) {
     // A collinear end needs nothing: it is no rounding, and doesn't stop.
     const bool open = continues && last + 2 == size();
     const double length = segments_[last + 1].begin.rate;
-    GentleCorners corners(segments_[first].begin.blend,
-                          open ? length / 2.0 : length - segments_[last + 1].end.blend);
+    OverlappingBlends corners(segments_[first].begin.blend,
+                              open ? length / 2.0 : length - segments_[last + 1].end.blend);
     for (std::size_t i = first; i <= last; ++i) {
       const End& end = segments_[i].end;
       corners.append(end.rate, norm(end.shift), end.blend, given[i].tolerance,
@@ -339,7 +338,7 @@ void Contour::widen(const std::vector<ContourSegment>& given, bool continues) {
 }
 
 // Makes the rounding of a corner reach as far as this.
-void Contour::overlap(std::size_t corner, double distance) {
+void Path::overlap(std::size_t corner, double distance) {
   segments_[corner].end.blend = segments_[corner + 1].begin.blend = distance;
   const std::vector<double>& shift = segments_[corner].end.shift;
   double place = segments_[corner + 1].begin.rate;  // the end of the line, from the corner
@@ -356,8 +355,8 @@ void Contour::overlap(std::size_t corner, double distance) {
   }
 }
 
-// @param first, last corners between lines at the end of the contour.
-void Contour::findOpen(std::size_t first, std::size_t last) {
+// @param first, last corners between lines at the end of the path.
+void Path::findOpen(std::size_t first, std::size_t last) {
   constexpr double kReaches = 1.0 - 1e-6;
   double to_middle = segments_[last + 1].begin.rate / 2.0;  // of the last line, from the corner
   for (std::size_t i = last + 1; i-- > first;) {
@@ -373,7 +372,7 @@ void Contour::findOpen(std::size_t first, std::size_t last) {
 }
 
 // The parameters up to which, and from which on, a segment is rounded.
-std::pair<double, double> Contour::rounded(std::size_t index) const {
+std::pair<double, double> Path::rounded(std::size_t index) const {
   const Segment& segment = segments_[index];
   double until = segment.begin.blend > 0.0 ? segment.begin.blend / segment.begin.rate : 0.0;
   double from = segment.end.blend > 0.0 ? 1.0 - segment.end.blend / segment.end.rate : 1.0;
@@ -388,20 +387,20 @@ std::pair<double, double> Contour::rounded(std::size_t index) const {
   return {middle, middle};
 }
 
-double Contour::roundedUntil(std::size_t segment) const { return rounded(segment).first; }
+double Path::roundedUntil(std::size_t segment) const { return rounded(segment).first; }
 
-double Contour::roundedFrom(std::size_t segment) const { return rounded(segment).second; }
+double Path::roundedFrom(std::size_t segment) const { return rounded(segment).second; }
 
-bool Contour::isLine(std::size_t segment) const {
-  return segments_[segment].shape == ContourSegment::Shape::kLine;
+bool Path::isLine(std::size_t segment) const {
+  return segments_[segment].shape == CurveSegment::Shape::kLine;
 }
 
-void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) const {
+void Path::evaluateGiven(std::size_t index, double u, PathPoint& point) const {
   const Segment& segment = segments_[index];
   point.position.resize(axes());
   point.first.resize(axes());
   point.second.resize(axes());
-  if (segment.shape == ContourSegment::Shape::kBezier) {
+  if (segment.shape == CurveSegment::Shape::kBezier) {
     for (std::size_t i = 0; i < axes(); ++i) {
       const double* c = &segment.powers[4 * i];
       point.position[i] = c[0] + u * (c[1] + u * (c[2] + u * c[3]));
@@ -416,7 +415,7 @@ void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) co
     point.first[i] = c[1];
     point.second[i] = 0.0;
   }
-  if (segment.shape == ContourSegment::Shape::kLine) return;
+  if (segment.shape == CurveSegment::Shape::kLine) return;
   const double angle = segment.from + u * segment.angle;
   const double radius = segment.radius + u * segment.growth;
   const double x = radius * std::cos(angle);
@@ -436,7 +435,7 @@ void Contour::evaluateGiven(std::size_t index, double u, ContourPoint& point) co
   point.second[b] += 2.0 * x * rate * segment.angle;
 }
 
-void Contour::evaluate(std::size_t index, double u, ContourPoint& point) const {
+void Path::evaluate(std::size_t index, double u, PathPoint& point) const {
   evaluateGiven(index, u, point);
   const Segment& segment = segments_[index];
   blend(segment.begin, u * segment.begin.rate, 1.0, point);
@@ -449,7 +448,7 @@ void Contour::evaluate(std::size_t index, double u, ContourPoint& point) const {
 
 // Adds shift (m(w) - |w|) + jump/4 (n(w) - w|w|), at a distance |w| from the corner, which is on
 // the side of w's sign.
-void Contour::blend(const End& end, double distance, double sign, ContourPoint& point) const {
+void Path::blend(const End& end, double distance, double sign, PathPoint& point) const {
   if (!(distance < end.blend)) return;
   const double y = distance / end.blend;
   const double position = end.blend * (kMidRounding + y * y * (0.75 - 0.125 * y * y)) - distance;
@@ -473,13 +472,13 @@ void Contour::blend(const End& end, double distance, double sign, ContourPoint& 
   }
 }
 
-std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) const {
+std::pair<double, double> Path::range(std::size_t index, std::size_t axis) const {
   const Segment& segment = segments_[index];
   if (isLine(index)) {
     const double* c = &segment.powers[2 * axis];
     return std::minmax({c[0], c[0] + c[1]});
   }
-  ContourPoint point;
+  PathPoint point;
   evaluateGiven(index, 0.0, point);
   double low = point.position[axis];
   double high = low;
@@ -490,7 +489,7 @@ std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) co
     high = std::max(high, point.position[axis]);
   };
   take(1.0);
-  if (segment.shape == ContourSegment::Shape::kBezier) {
+  if (segment.shape == CurveSegment::Shape::kBezier) {
     // c1 + 2 c2 u + 3 c3 u^2 = 0
     const double* c = &segment.powers[4 * axis];
     const double root = std::sqrt(std::max(0.0, c[2] * c[2] - 3.0 * c[1] * c[3]));
@@ -498,7 +497,7 @@ std::pair<double, double> Contour::range(std::size_t index, std::size_t axis) co
     if (sum != 0.0) take(c[1] / sum);
     if (c[3] != 0.0) take(sum / (3.0 * c[3]));
   }
-  if (segment.shape == ContourSegment::Shape::kArc) {
+  if (segment.shape == CurveSegment::Shape::kArc) {
     for (std::size_t k = 0; k < 2; ++k) {
       if (segment.plane[k] != axis) continue;
       const double quarter = k == 0 ? 0.0 : kPi / 2.0;  // the angle of an extreme

@@ -9,9 +9,9 @@
 
 namespace stepdriver::motion {
 
-/// A segment of a contour, from the end of the one before it. Numbers are in the units of the axes,
+/// A segment of a path, from the end of the one before it. Numbers are in the units of the axes,
 /// one for each axis.
-struct ContourSegment {
+struct CurveSegment {
   enum class Shape {
     kLine,
     /// A circular arc in the plane of two axes; the others move in proportion to its angle.
@@ -34,24 +34,24 @@ struct ContourSegment {
   double speed = std::numeric_limits<double>::infinity();
   std::vector<bool> measured;  ///< the axes of which this is the speed; empty: all
   /// [unit] How far the corner at its end may be rounded; 0: an exact stop at the corner. It is
-  /// ignored at the end of the contour and if there is no corner.
+  /// ignored at the end of the path and if there is no corner.
   double tolerance = 0.0;
   /// Up to this parameter the corner at its end leaves it as it is, and so do all later corners.
   double kept = 0.0;
   std::size_t number = 0;  ///< its number in a refusal
-  /// [unit] How far the corner at its end is rounded, as Contour::blendAfter() told of the same
+  /// [unit] How far the corner at its end is rounded, as Path::blendAfter() told of the same
   /// corner, whatever else allows. Empty: as far as possible.
   std::optional<double> blend;
 };
 
-/// A point of a contour and its derivatives with respect to the parameter of its segment.
-struct ContourPoint {
+/// A point of a path and its derivatives with respect to the parameter of its segment.
+struct PathPoint {
   std::vector<double> position;
   std::vector<double> first;
   std::vector<double> second;
 };
 
-/// What is continuous along a contour wherever there is no stop.
+/// What is continuous along a path wherever there is no stop.
 enum class Continuity {
   kDirection,
   kCurvature,  ///< and the direction: the acceleration of a motion along it needn't jump
@@ -63,7 +63,7 @@ enum class Continuity {
 /// A corner is where the direction changes by more than a millionth. Let p(w) be the path as given
 /// near a corner at w = 0, t1 and t2 its directions before and after it, and w a multiple of the
 /// parameter of each segment with |p'(0)| = 1: on lines and arcs, the distance to the corner. The
-/// path is the sum of a curve without a corner and of (t2 - t1) |w|/2. Instead of |w| the contour
+/// path is the sum of a curve without a corner and of (t2 - t1) |w|/2. Instead of |w| the path
 /// has, for |w| < d,
 ///
 ///     m(w) = d (3/8 + 3/4 (w/d)^2 - 1/8 (w/d)^4)
@@ -75,7 +75,7 @@ enum class Continuity {
 /// point of the path farther from it. d is the largest that makes this the tolerance or less, and
 /// that is at most
 /// - half of either segment (half of its parameter), so that corners never overlap,
-/// - what a segment doesn't keep (ContourSegment::kept), and
+/// - what a segment doesn't keep (CurveSegment::kept), and
 /// - 1/(2 max|p''|) over that half, so that its derivative is never 0: with y = |w|/d, it is at
 ///   least sqrt(cos^2(turn/2) + y^2 sin^2(turn/2)) - y/2.
 ///
@@ -85,7 +85,7 @@ enum class Continuity {
 /// If the curvature has to be continuous, a place where it jumps is rounded too, even if the
 /// direction doesn't change there. Let c be the jump of p''. It makes a jump of the curvature
 /// unless it is along t1 + t2. The path is then a curve without a corner and a jump plus (t2 - t1)
-/// |w|/2 + c w|w|/4, and instead of w|w| the contour has, for |w| < d,
+/// |w|/2 + c w|w|/4, and instead of w|w| the path has, for |w| < d,
 ///
 ///     n(w) = 2 d^2 (3/16 (w/d) + 3/8 (w/d)^3 - 1/16 (w/d)^5)
 ///
@@ -99,12 +99,12 @@ enum class Continuity {
 /// - the sum of all roundings is within the tolerance at each corner; between two corners it is
 ///   convex, so it is largest at one of them,
 /// - it ends before any other kind of segment, corner or stop, and in the middle of the last
-///   segment if the contour will be continued,
+///   segment if the path will be continued,
 /// - the sum of sin(turn/2) of all corners within 2 d is 1/2 or less: so is that of all roundings
 /// at
 ///   any place, each of which changes the derivative by less than its sin(turn/2), so |p'| is 1/2
 ///   or more.
-class Contour {
+class Path {
  public:
   /// A control point of a Bezier that is at its end, or nearer to it than a fifth of the
   /// resolution, is moved away by that: the curve deviates by less than a tenth of the resolution.
@@ -115,8 +115,8 @@ class Contour {
   /// which
   ///   no axis can pass without a stop; it names the segment (the first is 0).
   /// @param continues more segments will be appended.
-  Contour(std::vector<double> start, const std::vector<ContourSegment>& segments, double resolution,
-          Continuity continuity = Continuity::kDirection, bool continues = false);
+  Path(std::vector<double> start, const std::vector<CurveSegment>& segments, double resolution,
+       Continuity continuity = Continuity::kDirection, bool continues = false);
 
   std::size_t axes() const { return start_.size(); }
   std::size_t size() const { return segments_.size(); }
@@ -124,16 +124,16 @@ class Contour {
   double resolution() const { return resolution_; }
 
   /// @param parameter from 0 to 1.
-  void evaluate(std::size_t segment, double parameter, ContourPoint& point) const;
+  void evaluate(std::size_t segment, double parameter, PathPoint& point) const;
   /// The same of the path as given, with all its corners.
-  void evaluateGiven(std::size_t segment, double parameter, ContourPoint& point) const;
+  void evaluateGiven(std::size_t segment, double parameter, PathPoint& point) const;
 
   /// Some of its segments, rounded as they are here.
-  Contour part(std::size_t first, std::size_t last) const;
+  Path part(std::size_t first, std::size_t last) const;
   /// The same with stops at some corners, which are not rounded.
   ///
   /// @param corners the segments that end at them; each one is separate.
-  Contour withStops(const std::vector<std::size_t>& corners) const;
+  Path withStops(const std::vector<std::size_t>& corners) const;
   /// Whether no rounding of another corner reaches the end of a segment, and its own one doesn't
   /// reach beyond this segment and the next one.
   bool isSeparate(std::size_t corner) const;
@@ -149,7 +149,7 @@ class Contour {
   /// rounded.
   double blendAfter(std::size_t segment) const { return segments_[segment].end.blend; }
   bool isLine(std::size_t segment) const;
-  /// From here on the roundings of corners will change if the contour is continued, as they must
+  /// From here on the roundings of corners will change if the path is continued, as they must
   /// not reach beyond the middle of its last segment.
   struct Place {
     std::size_t segment = 0;
@@ -158,7 +158,7 @@ class Contour {
   Place openFrom() const { return open_; }
   /// Whether the motion has to stop at the end of a segment.
   bool stopsAfter(std::size_t segment) const { return segments_[segment].stops; }
-  /// [unit/s] See ContourSegment.
+  /// [unit/s] See CurveSegment.
   double speed(std::size_t segment) const { return segments_[segment].speed; }
   const std::vector<bool>& measured(std::size_t segment) const {
     return segments_[segment].measured;
@@ -173,7 +173,7 @@ class Contour {
     std::vector<double> jump;   // c; empty: 0
   };
   struct Segment {
-    ContourSegment::Shape shape;
+    CurveSegment::Shape shape;
     // Coefficients of the powers of the parameter, one after the other: 2 for each axis, or 4 of a
     // Bezier. Of an arc, those of its two axes are unused.
     std::vector<double> powers;
@@ -196,15 +196,15 @@ class Contour {
     std::vector<bool> measured;
   };
 
-  Segment placed(const std::vector<double>& from, const ContourSegment& given) const;
-  void round(std::size_t corner, const ContourSegment& given, Continuity continuity);
+  Segment placed(const std::vector<double>& from, const CurveSegment& given) const;
+  void round(std::size_t corner, const CurveSegment& given, Continuity continuity);
   bool isGentle(std::size_t corner) const;
-  void widen(const std::vector<ContourSegment>& given, bool continues);
+  void widen(const std::vector<CurveSegment>& given, bool continues);
   void overlap(std::size_t corner, double distance);
   void findOpen(std::size_t first, std::size_t last);
   std::pair<double, double> rounded(std::size_t segment) const;
   double sharpest(const Segment& segment, double rate) const;
-  void blend(const End& end, double distance, double sign, ContourPoint& point) const;
+  void blend(const End& end, double distance, double sign, PathPoint& point) const;
 
   std::vector<double> start_;
   double resolution_;
@@ -212,7 +212,7 @@ class Contour {
   Place open_;
 };
 
-/// The centre and the angle of a ContourSegment.
+/// The centre and the angle of a CurveSegment.
 struct Arc {
   std::array<double, 2> centre{};
   double angle = 0.0;  ///< [rad]

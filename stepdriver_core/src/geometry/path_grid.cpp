@@ -23,39 +23,39 @@ constexpr std::size_t kUsualParts = 24;  // of a segment
 
 }  // namespace
 
-ContourGrid::ContourGrid(const Contour& contour, double begin, const Fineness& fineness)
-    : contour_(contour), fineness_(fineness), axes_(contour.axes()) {
-  reserve(kUsualParts * contour.size());
-  ContourPoint start;
-  contour.evaluate(0, begin, start);
+PathGrid::PathGrid(const Path& path, double begin, const Fineness& fineness)
+    : path_(path), fineness_(fineness), axes_(path.axes()) {
+  reserve(kUsualParts * path.size());
+  PathPoint start;
+  path.evaluate(0, begin, start);
   positions_.assign(start.position.begin(), start.position.end());
   stops_.push_back(false);
-  for (std::size_t i = 0; i < contour.size(); ++i) {
+  for (std::size_t i = 0; i < path.size(); ++i) {
     giveWay(i);
     const double from = i == 0 ? begin : 0.0;
-    const double first = std::max(from, contour.roundedUntil(i));
-    const double last = std::max(from, contour.roundedFrom(i));
+    const double first = std::max(from, path.roundedUntil(i));
+    const double last = std::max(from, path.roundedFrom(i));
     evaluate(i, from, scratch_.front());
     if (first > from) divide(i, first, partsOfCorner(i, first));
-    if (last - first > kLeastPart) divide(i, last, contour.isLine(i) ? 1 : kPartsOfCurve);
+    if (last - first > kLeastPart) divide(i, last, path.isLine(i) ? 1 : kPartsOfCurve);
     if (last < 1.0) {
       // A part that is too short is left out.
       if (scratch_.front().parameter != last) evaluate(i, last, scratch_.front());
       divide(i, 1.0, partsOfCorner(i, 1.0));
     }
-    stops_.back() = contour.stopsAfter(i);
+    stops_.back() = path.stopsAfter(i);
   }
 }
 
-void ContourGrid::evaluate(std::size_t segment, double parameter, Place& place) const {
-  contour_.evaluate(segment, parameter, place.point);
+void PathGrid::evaluate(std::size_t segment, double parameter, Place& place) const {
+  path_.evaluate(segment, parameter, place.point);
   place.parameter = parameter;
   double sum = 0.0;
   for (const double x : place.point.first) sum += x * x;
   place.rate = std::sqrt(sum);
 }
 
-int ContourGrid::partsOfCorner(std::size_t segment, double to) {
+int PathGrid::partsOfCorner(std::size_t segment, double to) {
   const Place& begin = scratch_.front();
   Place& end = scratch_.back();
   evaluate(segment, to, end);
@@ -64,7 +64,7 @@ int ContourGrid::partsOfCorner(std::size_t segment, double to) {
 
 // The part of a segment from the first place in scratch_ on, which is then that of `to`: into
 // `parts` intervals, or more if they would be too long; one part is straight.
-void ContourGrid::divide(std::size_t segment, double to, int parts) {
+void PathGrid::divide(std::size_t segment, double to, int parts) {
   auto& [begin, middle, end] = scratch_;
   const double from = begin.parameter;
   if (parts == 1) {
@@ -92,7 +92,7 @@ void ContourGrid::divide(std::size_t segment, double to, int parts) {
   }
 }
 
-Division ContourGrid::divideEach(const std::vector<bool>& which, std::size_t parts) {
+Division PathGrid::divideEach(const std::vector<bool>& which, std::size_t parts) {
   Division division{{}, parts};
   for (std::size_t i = 0; i < size(); ++i) {
     if (which[i] && !intervals_[i].straight) division.intervals.push_back(i);
@@ -121,8 +121,8 @@ Division ContourGrid::divideEach(const std::vector<bool>& which, std::size_t par
   return division;
 }
 
-std::size_t ContourGrid::firstFrom(const Contour::Place& place) const {
-  const auto ends_before = [](const Interval& interval, const Contour::Place& at) {
+std::size_t PathGrid::firstFrom(const Path::Place& place) const {
+  const auto ends_before = [](const Interval& interval, const Path::Place& at) {
     return interval.segment < at.segment ||
            (interval.segment == at.segment && interval.to <= at.parameter);
   };
@@ -131,15 +131,15 @@ std::size_t ContourGrid::firstFrom(const Contour::Place& place) const {
       intervals_.begin());
 }
 
-void ContourGrid::reserve(std::size_t intervals) {
+void PathGrid::reserve(std::size_t intervals) {
   intervals_.reserve(intervals);
   derivatives_.reserve(4 * axes_ * intervals);
   positions_.reserve(axes_ * (intervals + 1));
   stops_.reserve(intervals + 1);
 }
 
-ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
-  ContourGrid made(*this);
+PathGrid PathGrid::divided(const std::vector<double>& distances) const {
+  PathGrid made(*this);
   made.intervals_.clear();
   made.derivatives_.clear();
   made.positions_.assign(position(0), position(0) + axes_);
@@ -151,7 +151,7 @@ ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
     made.positions_.insert(made.positions_.end(), end, end + axes_);
     made.stops_.push_back(false);
   };
-  ContourPoint point;
+  PathPoint point;
   double begin = 0.0;  // distance from the start
   auto next = distances.begin();
   for (std::size_t i = 0; i < size(); ++i) {
@@ -178,13 +178,13 @@ ContourGrid ContourGrid::divided(const std::vector<double>& distances) const {
   return made;
 }
 
-ContourGrid ContourGrid::after(double distance) const {
+PathGrid PathGrid::after(double distance) const {
   std::size_t first = 0;
   double begin = 0.0;
   while (first + 1 < size() && begin + intervals_[first].length <= distance) {
     begin += intervals_[first++].length;
   }
-  ContourGrid made(*this);
+  PathGrid made(*this);
   const auto from = static_cast<std::ptrdiff_t>(first);
   const auto width = static_cast<std::ptrdiff_t>(axes_);
   made.intervals_.erase(made.intervals_.begin(), made.intervals_.begin() + from);
@@ -192,7 +192,7 @@ ContourGrid ContourGrid::after(double distance) const {
   made.derivatives_.erase(made.derivatives_.begin(), made.derivatives_.begin() + 4 * from * width);
   made.stops_.erase(made.stops_.begin(), made.stops_.begin() + from);
   made.stops_.front() = false;
-  ContourPoint point;
+  PathPoint point;
   Interval& cut = made.intervals_.front();
   cut.from = evaluateAt(first, distance - begin, point);
   cut.length -= distance - begin;
@@ -202,7 +202,7 @@ ContourGrid ContourGrid::after(double distance) const {
   return made;
 }
 
-double ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoint& point) const {
+double PathGrid::evaluateAt(std::size_t interval, double distance, PathPoint& point) const {
   const Interval& of = intervals_[interval];
   point.position.resize(axes_);
   point.first.resize(axes_);
@@ -240,7 +240,7 @@ double ContourGrid::evaluateAt(std::size_t interval, double distance, ContourPoi
 }
 
 // [rad] Nearly.
-double ContourGrid::turnOf(const Place& begin, const Place& end) const {
+double PathGrid::turnOf(const Place& begin, const Place& end) const {
   double square = 0.0;
   for (std::size_t i = 0; i < axes_; ++i) {
     const double change = end.point.first[i] / end.rate - begin.point.first[i] / begin.rate;
@@ -249,7 +249,7 @@ double ContourGrid::turnOf(const Place& begin, const Place& end) const {
   return std::sqrt(square);
 }
 
-bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {
+bool PathGrid::tooLong(const Place& begin, const Place& middle, const Place& end) const {
   const double least = std::min({begin.rate, middle.rate, end.rate});
   const double most = std::max({begin.rate, middle.rate, end.rate});
   if (most > kMostRateRatio * least) return true;
@@ -257,11 +257,11 @@ bool ContourGrid::tooLong(const Place& begin, const Place& middle, const Place& 
   if (turn > fineness_.most_turn) return true;
   // Of a cubic from an arc of this length and turn, at a constant speed.
   const double length = middle.rate * (end.parameter - begin.parameter);
-  return length * turn * turn * turn / 384.0 > kMostArcDeviation * contour_.resolution();
+  return length * turn * turn * turn / 384.0 > kMostArcDeviation * path_.resolution();
 }
 
 // Simpson's rule with the derivatives of |p'| at the ends, exact up to the fifth power.
-double ContourGrid::lengthOf(const Place& begin, const Place& middle, const Place& end) const {
+double PathGrid::lengthOf(const Place& begin, const Place& middle, const Place& end) const {
   double slopes = 0.0;
   for (std::size_t i = 0; i < axes_; ++i) {
     slopes += begin.point.first[i] * begin.point.second[i] / begin.rate -
@@ -272,8 +272,8 @@ double ContourGrid::lengthOf(const Place& begin, const Place& middle, const Plac
          h * h / 60.0 * slopes;
 }
 
-void ContourGrid::append(std::size_t segment, const Place& begin, const Place& end, double length,
-                         bool straight) {
+void PathGrid::append(std::size_t segment, const Place& begin, const Place& end, double length,
+                      bool straight) {
   intervals_.emplace_back();
   derivatives_.resize(derivatives_.size() + 4 * axes_);
   positions_.resize(positions_.size() + axes_);
@@ -281,8 +281,8 @@ void ContourGrid::append(std::size_t segment, const Place& begin, const Place& e
   put(size() - 1, segment, begin, end, length, straight);
 }
 
-void ContourGrid::put(std::size_t index, std::size_t segment, const Place& begin, const Place& end,
-                      double length, bool straight) {
+void PathGrid::put(std::size_t index, std::size_t segment, const Place& begin, const Place& end,
+                   double length, bool straight) {
   intervals_[index] = {length, segment, straight, begin.parameter, end.parameter};
   double* derivatives = &derivatives_[4 * axes_ * index];
   withRespectToLength(begin, derivatives, derivatives + axes_);
@@ -291,8 +291,8 @@ void ContourGrid::put(std::size_t index, std::size_t segment, const Place& begin
   stops_[index + 1] = false;
 }
 
-void ContourGrid::withRespectToLength(const Place& place, double* first, double* second) const {
-  const ContourPoint& point = place.point;
+void PathGrid::withRespectToLength(const Place& place, double* first, double* second) const {
+  const PathPoint& point = place.point;
   double along = 0.0;
   for (std::size_t i = 0; i < axes_; ++i) along += point.first[i] * point.second[i];
   const double square = place.rate * place.rate;

@@ -42,11 +42,11 @@ struct Division {
   }
 };
 
-/// A contour divided into short intervals of its length s, each from one place to the next. A
+/// A path divided into short intervals of its length s, each from one place to the next. A
 /// straight part is one interval. Only one thread uses it at a time.
-class ContourGrid {
+class PathGrid {
  public:
-  /// How finely a contour is divided.
+  /// How finely a path is divided.
   struct Fineness {
     double most_turn;          ///< [rad] of an interval
     int parts_of_gentle_half;  ///< at least, of half a corner that hardly turns
@@ -58,8 +58,7 @@ class ContourGrid {
   /// @}
 
   /// @param begin the parameter of the first segment at which it begins.
-  explicit ContourGrid(const Contour& contour, double begin = 0.0,
-                       const Fineness& fineness = kForSpeed);
+  explicit PathGrid(const Path& path, double begin = 0.0, const Fineness& fineness = kForSpeed);
 
   struct Interval {
     double length = 0.0;  ///< [unit]
@@ -75,14 +74,14 @@ class ContourGrid {
   /// With straight intervals divided at some distances from the start.
   ///
   /// @param distances in increasing order.
-  ContourGrid divided(const std::vector<double>& distances) const;
+  PathGrid divided(const std::vector<double>& distances) const;
   /// From a distance from its start on, which is before its end.
-  ContourGrid after(double distance) const;
+  PathGrid after(double distance) const;
 
   std::size_t axes() const { return axes_; }
   std::size_t size() const { return intervals_.size(); }
   /// The first interval that doesn't end before a place; size() if there is none.
-  std::size_t firstFrom(const Contour::Place& place) const;
+  std::size_t firstFrom(const Path::Place& place) const;
   /// How many intervals it may have without needing more memory.
   std::size_t capacity() const { return intervals_.capacity(); }
   const Interval& operator[](std::size_t index) const { return intervals_[index]; }
@@ -91,10 +90,10 @@ class ContourGrid {
   /// At a corner, and at the end.
   bool stopsAt(std::size_t place) const { return stops_[place] != 0; }
   /// The point at the middle parameter of an interval, until another one is evaluated.
-  const ContourPoint& evaluateMiddle(std::size_t interval) const {
+  const PathPoint& evaluateMiddle(std::size_t interval) const {
     const Interval& of = intervals_[interval];
-    ContourPoint& middle = scratch_.front().point;
-    contour_.evaluate(of.segment, (of.from + of.to) / 2.0, middle);
+    PathPoint& middle = scratch_.front().point;
+    path_.evaluate(of.segment, (of.from + of.to) / 2.0, middle);
     return middle;
   }
 
@@ -102,7 +101,7 @@ class ContourGrid {
   /// beyond an interval that isn't straight, its end.
   ///
   /// @return its parameter.
-  double evaluateAt(std::size_t interval, double distance, ContourPoint& point) const;
+  double evaluateAt(std::size_t interval, double distance, PathPoint& point) const;
 
   /// @name The first two derivatives of the position with respect to s, at the ends of an interval.
   /// The second one jumps at a place if the curvature does; the first one only at a stop.
@@ -114,10 +113,10 @@ class ContourGrid {
   /// @}
 
  private:
-  // A point of the contour with its parameter, and what follows from its derivatives.
+  // A point of the path with its parameter, and what follows from its derivatives.
   struct Place {
     double parameter = 0.0;
-    ContourPoint point;
+    PathPoint point;
     double rate = 0.0;  // |p'|
   };
 
@@ -137,7 +136,7 @@ class ContourGrid {
   void reserve(std::size_t intervals);
   void withRespectToLength(const Place& place, double* first, double* second) const;
 
-  const Contour& contour_;
+  const Path& path_;
   Fineness fineness_;
   std::size_t axes_;
   std::vector<Interval> intervals_;

@@ -133,7 +133,7 @@ class Machine::Impl {
     return joinedText(own_axes_, [](const MachineAxis* axis) { return axis->config().name; });
   }
 
-  CoordinatedMove moveLine(const LineRequest& request) {
+  CoordinatedMove moveLine(const motion::LineRequest& request) {
     const std::vector<AxisId> axes = idsOf(axesOf(request.names));
     if (request.positions.size() != axes.size()) {
       throw Refused(fmt::format("there are {} names, but {} positions", axes.size(),
@@ -178,7 +178,7 @@ class Machine::Impl {
     return refusalsOf(ask(*shell_, std::move(wanted)));
   }
 
-  CoordinatedMove followTrajectory(const TrajectoryRequest& request) {
+  CoordinatedMove followTrajectory(const motion::TrajectoryRequest& request) {
     if (!(request.begin_in >= 0.0 && request.begin_in < motion::Profile::kLongest)) {
       throw Refused(fmt::format("the trajectory begins in {} s, but must begin in 0 to {} s",
                                 numberText(request.begin_in),
@@ -188,69 +188,69 @@ class Machine::Impl {
         request.begin_in > 0.0 ? shell_->motionNow() + nanoseconds(request.begin_in) : 0;
     return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
       wanted.begins_ns = begins_ns;
-      std::vector<axis::PathAxis> facts = factsOf(now, wanted.axes);
+      std::vector<motion::PathAxis> facts = factsOf(now, wanted.axes);
       const std::vector<motion::MotionState> expected = begins_ns > 0
                                                             ? statesAt(begins_ns, now, wanted.axes)
                                                             : expectedStates(wanted.axes, facts);
-      const std::vector<axis::TrajectoryPoint> points = turned(request.points, facts, expected);
-      wanted.prepared = disposer_.keep(std::make_shared<const axis::PreparedTrajectory>(
+      const std::vector<motion::TrajectoryPoint> points = turned(request.points, facts, expected);
+      wanted.prepared = disposer_.keep(std::make_shared<const motion::PreparedTrajectory>(
           std::move(facts), points, expected, request.allow_slower));
     });
   }
 
   // Points whose first position on each continuous axis is the one that is nearest to the axis.
-  static std::vector<axis::TrajectoryPoint> turned(
-      std::vector<axis::TrajectoryPoint> points, const std::vector<axis::PathAxis>& facts,
+  static std::vector<motion::TrajectoryPoint> turned(
+      std::vector<motion::TrajectoryPoint> points, const std::vector<motion::PathAxis>& facts,
       const std::vector<motion::MotionState>& expected) {
     for (std::size_t i = 0; i < facts.size(); ++i) {
       if (points.empty() || i >= points.front().positions.size()) continue;  // it will be refused
       const double begin = facts[i].positionOf(expected[i].position.value());
       const double turns = facts[i].turnsTowards(begin, points.front().positions[i]);
       if (!(std::abs(turns) > 0.0)) continue;
-      for (axis::TrajectoryPoint& point : points) {
+      for (motion::TrajectoryPoint& point : points) {
         if (i < point.positions.size()) point.positions[i] += turns;
       }
     }
     return points;
   }
 
-  CoordinatedMove followPath(const PathRequest& request) {
+  CoordinatedMove followPath(const motion::PathRequest& request) {
     return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
-      const std::vector<axis::PathAxis> facts = factsOf(now, wanted.axes);
-      const std::vector<PathOrigin> origins = originsOf(now, wanted.axes);
-      PathPlan plan = planPath(request, facts, origins);
+      const std::vector<motion::PathAxis> facts = factsOf(now, wanted.axes);
+      const std::vector<motion::PathOrigin> origins = originsOf(now, wanted.axes);
+      motion::PathPlan plan = motion::planPath(request, facts, origins);
       wanted.path.emplace();
       std::vector<motion::MotionState> expected;
-      for (const PathOrigin& origin : origins) {
+      for (const motion::PathOrigin& origin : origins) {
         wanted.path->from.push_back(origin.rest);
         expected.push_back({motion::DoubleDouble(origin.rest)});
       }
       wanted.path->targets = std::move(plan.targets);
       if (plan.window) wanted.path->window = disposer_.keep(std::move(plan.window));
       wanted.prepared = disposer_.keep(
-          std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected));
+          std::make_shared<const motion::PreparedTrajectory>(facts, plan.points, expected));
     });
   }
 
-  double pathDuration(const PathRequest& request, const std::vector<double>& from) const {
+  double pathDuration(const motion::PathRequest& request, const std::vector<double>& from) const {
     if (request.more_follows) throw Refused("a path is planned as a whole: no more may follow");
     const std::vector<AxisId> axes = idsOf(axesOf(request.names));
     const auto now = shell_->snapshot();
-    const std::vector<axis::PathAxis> facts = factsOf(*now, axes);
-    const std::vector<PathOrigin> origins =
+    const std::vector<motion::PathAxis> facts = factsOf(*now, axes);
+    const std::vector<motion::PathOrigin> origins =
         from.empty() ? originsOf(*now, axes) : originsAt(from, facts);
-    const PathPlan plan = planPath(request, facts, origins);
+    const motion::PathPlan plan = motion::planPath(request, facts, origins);
     std::vector<motion::MotionState> begin;
     begin.reserve(origins.size());
-    for (const PathOrigin& origin : origins) {
+    for (const motion::PathOrigin& origin : origins) {
       begin.push_back({motion::DoubleDouble(origin.rest)});
     }
-    const axis::PreparedTrajectory checked(facts, plan.points, begin);
+    const motion::PreparedTrajectory checked(facts, plan.points, begin);
     return plan.points.back().time;
   }
 
   // Replaces the path by a longer one, from some time ahead on; later if that was too soon.
-  PathAhead appendPath(const PathAppend& request) {
+  motion::PathAhead appendPath(const motion::PathAppend& request) {
     pulse::Nanoseconds lead = kLeastLead;
     for (int i = 0;; ++i) {
       const pulse::Nanoseconds began = clock_.now();
@@ -261,7 +261,7 @@ class Machine::Impl {
                                   howItEnded(*snapshot, request.path)));
       }
       const AxisSnapshot::Path& path = *snapshot->axes[*id].path;
-      const auto queued = std::dynamic_pointer_cast<const QueuedPath>(path.shared);
+      const auto queued = std::dynamic_pointer_cast<const motion::QueuedPath>(path.shared);
       if (!queued) throw Refused("the path is complete: it was told that no more follows");
       const double passed = path.along->stateAt(shell_->motionNow()).position.value();
       if (request.segments.empty() && request.more_follows) return queued->aheadOf(passed);
@@ -269,12 +269,12 @@ class Machine::Impl {
       if (!path.slows_down && i < kMostExtensions) {
         changeable = path.along->stateAt(shell_->motionNow() + lead).position.value();
       }
-      std::shared_ptr<const QueuedPath> continued;
+      std::shared_ptr<const motion::QueuedPath> continued;
       activity::Extension extension;
       try {
         const Interruptible extending([&] { return isLost(*shell_->snapshot(), request.path); });
-        QueuedPath::Longer longer = queued->extended(request.segments, request.more_follows,
-                                                     std::max(0.0, passed - kKept), changeable);
+        motion::QueuedPath::Longer longer = queued->extended(
+            request.segments, request.more_follows, std::max(0.0, passed - kKept), changeable);
         continued = disposer_.keep(std::move(longer.path));
         extension = {queued,          continued,           longer.same_from, longer.same_until,
                      longer.moves_on, continued->targets()};
@@ -292,12 +292,12 @@ class Machine::Impl {
     }
   }
 
-  std::optional<PathAhead> pathAhead(std::uint64_t number) const {
+  std::optional<motion::PathAhead> pathAhead(std::uint64_t number) const {
     const auto snapshot = shell_->snapshot();
     const auto id = followerOf(*snapshot, number);
     if (!id) return std::nullopt;
     const AxisSnapshot::Path& path = *snapshot->axes[*id].path;
-    const auto queued = std::dynamic_pointer_cast<const QueuedPath>(path.shared);
+    const auto queued = std::dynamic_pointer_cast<const motion::QueuedPath>(path.shared);
     if (!queued) return std::nullopt;
     return queued->aheadOf(path.along->stateAt(shell_->motionNow()).position.value());
   }
@@ -324,13 +324,13 @@ class Machine::Impl {
         std::find_if(snapshot.axes.begin(), snapshot.axes.end(), [path](const AxisSnapshot& axis) {
           return axis.ended_path != nullptr && axis.ended_path->move == path;
         });
-    return axis::howItEnded(followed != snapshot.axes.end() ? followed->ended_path.get() : nullptr,
-                            path);
+    return motion::howItEnded(
+        followed != snapshot.axes.end() ? followed->ended_path.get() : nullptr, path);
   }
 
   // The motion under way, now: about where a trajectory will begin.
-  std::vector<motion::MotionState> expectedStates(const std::vector<AxisId>& axes,
-                                                  const std::vector<axis::PathAxis>& facts) const {
+  std::vector<motion::MotionState> expectedStates(
+      const std::vector<AxisId>& axes, const std::vector<motion::PathAxis>& facts) const {
     std::vector<motion::MotionState> expected;
     expected.reserve(axes.size());
     for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -394,21 +394,21 @@ class Machine::Impl {
     }
   }
 
-  static std::vector<axis::PathAxis> factsOf(const MachineSnapshot& snapshot,
-                                             const std::vector<AxisId>& axes) {
-    std::vector<axis::PathAxis> facts;
+  static std::vector<motion::PathAxis> factsOf(const MachineSnapshot& snapshot,
+                                               const std::vector<AxisId>& axes) {
+    std::vector<motion::PathAxis> facts;
     facts.reserve(axes.size());
     for (const AxisId axis : axes) facts.push_back(snapshot.axes.at(axis).path_axis);
     return facts;
   }
 
-  static std::vector<PathOrigin> originsAt(const std::vector<double>& positions,
-                                           const std::vector<axis::PathAxis>& facts) {
+  static std::vector<motion::PathOrigin> originsAt(const std::vector<double>& positions,
+                                                   const std::vector<motion::PathAxis>& facts) {
     if (positions.size() != facts.size()) {
       throw Refused(fmt::format("there are {} names, but {} positions from which the path begins",
                                 facts.size(), positions.size()));
     }
-    std::vector<PathOrigin> origins;
+    std::vector<motion::PathOrigin> origins;
     for (std::size_t i = 0; i < facts.size(); ++i) {
       if (!std::isfinite(positions[i])) {
         facts[i].refuse(
@@ -421,9 +421,9 @@ class Machine::Impl {
     }
     return origins;
   }
-  static std::vector<PathOrigin> originsOf(const MachineSnapshot& snapshot,
-                                           const std::vector<AxisId>& axes) {
-    std::vector<PathOrigin> origins;
+  static std::vector<motion::PathOrigin> originsOf(const MachineSnapshot& snapshot,
+                                                   const std::vector<AxisId>& axes) {
+    std::vector<motion::PathOrigin> origins;
     origins.reserve(axes.size());
     for (const AxisId axis : axes) {
       const AxisSnapshot& own = snapshot.axes.at(axis);
@@ -611,23 +611,28 @@ std::vector<std::string> Machine::followSetpoints(SetpointMode mode, double time
   return impl_->followSetpoints(mode, timeout, messages);
 }
 
-CoordinatedMove Machine::moveLine(const LineRequest& request) { return impl_->moveLine(request); }
+CoordinatedMove Machine::moveLine(const motion::LineRequest& request) {
+  return impl_->moveLine(request);
+}
 
-CoordinatedMove Machine::followTrajectory(const TrajectoryRequest& request) {
+CoordinatedMove Machine::followTrajectory(const motion::TrajectoryRequest& request) {
   return impl_->followTrajectory(request);
 }
 
-CoordinatedMove Machine::followPath(const PathRequest& request) {
+CoordinatedMove Machine::followPath(const motion::PathRequest& request) {
   return impl_->followPath(request);
 }
 
-double Machine::pathDuration(const PathRequest& request, const std::vector<double>& from) const {
+double Machine::pathDuration(const motion::PathRequest& request,
+                             const std::vector<double>& from) const {
   return impl_->pathDuration(request, from);
 }
 
-PathAhead Machine::appendPath(const PathAppend& request) { return impl_->appendPath(request); }
+motion::PathAhead Machine::appendPath(const motion::PathAppend& request) {
+  return impl_->appendPath(request);
+}
 
-std::optional<PathAhead> Machine::pathAhead(std::uint64_t path) const {
+std::optional<motion::PathAhead> Machine::pathAhead(std::uint64_t path) const {
   return impl_->pathAhead(path);
 }
 

@@ -44,14 +44,14 @@ struct AxisSnapshot {
   /// The path that it follows with other axes.
   struct Path {
     std::uint64_t move = 0;  ///< the number of this axis's move
-    std::shared_ptr<const axis::SharedPath> shared;
+    std::shared_ptr<const motion::SharedPath> shared;
     std::shared_ptr<const motion::Profile> along;  ///< the motion along it that was ordered last
     bool slows_down = false;                       ///< that motion slows down
   };
   std::optional<Path> path;
-  std::shared_ptr<const axis::EndedPath> ended_path;  ///< the last one; nullptr if there is none
+  std::shared_ptr<const motion::EndedPath> ended_path;  ///< the last one; nullptr if there is none
   std::vector<Motion> motions;
-  axis::PathAxis path_axis;
+  motion::PathAxis path_axis;
   pulse::ChannelState channel;  ///< from the engine's last news
   axis::AxisMemory memory;
 };

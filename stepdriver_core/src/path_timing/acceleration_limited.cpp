@@ -64,7 +64,7 @@ struct Trapezoid {
 
 // @param shortest [s] shorter ramps become so long if there is room for that.
 Trapezoid trapezoidOf(double length, double begin_square, double end_square,
-                      const ContourSpeed::Ramp& ramp, double peak_square, double shortest) {
+                      const Reachability::Ramp& ramp, double peak_square, double shortest) {
   Trapezoid made;
   made.peak = std::sqrt(peak_square);
   made.ramp_up = (made.peak - std::sqrt(begin_square)) / ramp.up;
@@ -89,8 +89,8 @@ Trapezoid trapezoidOf(double length, double begin_square, double end_square,
   return made;
 }
 
-// The demands of a cubic on the axes, in parts of their limits: the largest of all axes.
-struct Demand {
+// The share of their limits that a cubic uses: the largest of all axes.
+struct CubicUsage {
   double acceleration_at_begin = 0.0;
   double acceleration_at_end = 0.0;
   double speed = 0.0;
@@ -102,13 +102,13 @@ struct Demand {
 // the speeds at both ends of an interval is kept until they change.
 class Knots {
  public:
-  Knots(const ContourGrid& grid, const std::vector<ContourLimits>& limits, double resolution)
+  Knots(const PathGrid& grid, const std::vector<TimingLimits>& limits, double resolution)
       : grid_(grid), limits_(limits), resolution_(resolution), axes_(grid.axes()) {
     kept_.reserve(grid.capacity());
     kept_.resize(grid.size());
   }
 
-  /// After ContourGrid::divideEach().
+  /// After PathGrid::divideEach().
   void regrid(const Division& division) {
     division.spread(kept_);
     for (std::size_t i = 0; i < division.intervals.size(); ++i) {
@@ -116,7 +116,7 @@ class Knots {
     }
   }
 
-  void findDurations(const ContourSpeed& speed) {
+  void findDurations(const Reachability& speed) {
     for (std::size_t i = 0; i < grid_.size(); ++i) {
       giveWayAt(i);
       const double begin = speed.square(i);
@@ -132,7 +132,7 @@ class Knots {
     }
   }
 
-  void make(const ContourSpeed& speed) {
+  void make(const Reachability& speed) {
     findDurations(speed);
     findClosest();
     knots_.clear();
@@ -156,10 +156,10 @@ class Knots {
   bool isSettled(std::size_t interval) const { return kept_[interval].settled; }
   void settle(std::size_t interval) { kept_[interval].settled = true; }
   /// Of the cubic of an interval that isn't straight.
-  const Demand& demandOf(std::size_t interval) {
+  const CubicUsage& usageOf(std::size_t interval) {
     Kept& kept = kept_[interval];
-    if (!kept.demand) {
-      kept.demand = cubicDemand(
+    if (!kept.usage) {
+      kept.usage = cubicUsage(
           kept.duration,
           [&](std::size_t j) -> Joint {
             return {grid_.position(interval)[j], grid_.firstAtBegin(interval)[j] * kept.begin};
@@ -168,7 +168,7 @@ class Knots {
             return {grid_.position(interval + 1)[j], grid_.firstAtEnd(interval)[j] * kept.end};
           });
     }
-    return *kept.demand;
+    return *kept.usage;
   }
 
   std::size_t size() const { return knots_.size(); }
@@ -182,8 +182,8 @@ class Knots {
   }
   double parameter(std::size_t knot) const { return knots_[knot].parameter; }
   double speed(std::size_t knot) const { return knots_[knot].speed; }
-  /// Whether it is a place of the contour, or on a straight part of it.
-  bool isOnContour(std::size_t knot) const { return knots_[knot].inner == kNone; }
+  /// Whether it is a place of the path, or on a straight part of it.
+  bool isOnPath(std::size_t knot) const { return knots_[knot].inner == kNone; }
   /// The first interval that contains the way from a knot to the next one.
   std::size_t intervalAfter(std::size_t knot) const {
     const Knot& of = knots_[knot];
@@ -206,11 +206,11 @@ class Knots {
   }
 
   /// Of the cubic that ends at a knot.
-  Demand demandBefore(std::size_t knot) {
+  CubicUsage usageBefore(std::size_t knot) {
     const std::size_t place = knots_[knot].place;
     const bool whole = place != kNone && knots_[knot - 1].place + 1 == place;
-    if (whole && !grid_[place - 1].straight) return demandOf(place - 1);
-    return cubicDemand(
+    if (whole && !grid_[place - 1].straight) return usageOf(place - 1);
+    return cubicUsage(
         time(knot) - time(knot - 1),
         [&](std::size_t j) -> Joint {
           return {position(knot - 1, j), velocity(knot - 1, j)};
@@ -231,7 +231,7 @@ class Knots {
     double begin = 0.0;  // unit/s
     double end = 0.0;
     double duration = 0.0;  // s
-    std::optional<Demand> demand = {};
+    std::optional<CubicUsage> usage = {};
     bool settled = false;
   };
   struct Knot {
@@ -252,8 +252,8 @@ class Knots {
 
   // @param from, to return the joint of an axis at the begin and at the end.
   template <typename From, typename To>
-  Demand cubicDemand(double duration, const From& from, const To& to) const {
-    Demand demand;
+  CubicUsage cubicUsage(double duration, const From& from, const To& to) const {
+    CubicUsage usage;
     const double rate = 1.0 / duration;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
       const auto [p0, v0] = from(j);
@@ -265,16 +265,16 @@ class Knots {
       const auto part = [&](double a) {
         return std::abs(a) / accelerationTowards(limits_[j], direction, a > 0.0 ? 1 : -1);
       };
-      demand.acceleration_at_begin = std::max(demand.acceleration_at_begin, part(begin));
-      demand.acceleration_at_end = std::max(demand.acceleration_at_end, part(end));
+      usage.acceleration_at_begin = std::max(usage.acceleration_at_begin, part(begin));
+      usage.acceleration_at_end = std::max(usage.acceleration_at_end, part(end));
       double speed = std::max(std::abs(v0), std::abs(v1));
       if (begin * end < 0.0) {
         const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
         speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
       }
-      demand.speed = std::max(demand.speed, speed / limits_[j].speed);
+      usage.speed = std::max(usage.speed, speed / limits_[j].speed);
     }
-    return demand;
+    return usage;
   }
 
   // [s] The duration closest to T = 2 length/(begin + end), that of a constant s'', for which the
@@ -307,13 +307,13 @@ class Knots {
     return even * (1.0 + std::clamp(stretch, -kMostStretch, kMostStretch));
   }
 
-  Trapezoid trapezoid(std::size_t interval, const ContourSpeed& speed) const {
+  Trapezoid trapezoid(std::size_t interval, const Reachability& speed) const {
     constexpr double kRounding = 1.001;  // for differences of times
     return trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
                        speed.ramp(interval), speed.peakSquare(interval), kRounding * closest_);
   }
 
-  void appendStraight(std::size_t interval, const ContourSpeed& speed, double time) {
+  void appendStraight(std::size_t interval, const Reachability& speed, double time) {
     const Trapezoid made = trapezoid(interval, speed);
     kept_[interval].duration = made.duration();
     appendOnLine(interval, time + made.ramp_up, made.way_up, made.peak);
@@ -326,7 +326,7 @@ class Knots {
   }
 
   Knot onLine(std::size_t interval, double time, double way, double speed) const {
-    const ContourGrid::Interval& of = grid_[interval];
+    const PathGrid::Interval& of = grid_[interval];
     const double part = std::min(1.0, way / of.length);
     return {time, interval, kNone, way, of.from + part * (of.to - of.from), speed};
   }
@@ -460,9 +460,9 @@ class Knots {
     closest_ = std::max(closest_, rounded);
   }
 
-  const ContourGrid& grid_;
-  const std::vector<ContourLimits>& limits_;
-  double resolution_;  // [unit] of the contour
+  const PathGrid& grid_;
+  const std::vector<TimingLimits>& limits_;
+  double resolution_;  // [unit] of the path
   std::size_t axes_;
   std::vector<Kept> kept_;  // of each interval
   std::vector<Knot> knots_;
@@ -481,22 +481,22 @@ struct Excess {
 // Whether an interval is so long that the motion isn't close to any limit at one of its ends, or
 // that the highest speed differs much between them: a motion that is as fast as possible is at one
 // of its limits everywhere.
-bool wastesTime(const ContourSpeed& speed, std::size_t interval, const Demand& demand) {
+bool wastesTime(const Reachability& speed, std::size_t interval, const CubicUsage& usage) {
   const double begin = speed.square(interval);
   const double end = speed.square(interval + 1);
   const double begin_use = begin / speed.capAtBegin(interval);
   const double end_use = end / speed.capAtEnd(interval);
   if (std::min(begin_use, end_use) > kFullUse)
     return std::max(begin, end) > kMostSquareRatio * std::min(begin, end);
-  return std::min(std::max(demand.acceleration_at_begin, begin_use),
-                  std::max(demand.acceleration_at_end, end_use)) < kFullUse;
+  return std::min(std::max(usage.acceleration_at_begin, begin_use),
+                  std::max(usage.acceleration_at_end, end_use)) < kFullUse;
 }
 
-// How far the cubic of an interval may be from the contour [unit] if its curvature changes evenly.
+// How far the cubic of an interval may be from the path [unit] if its curvature changes evenly.
 // Let L be its length, b the angle by which it turns, and r = (v1 - v0)/(v1 + v0) for the speeds at
 // its ends. The fourth derivative of q(s(t)) with constant s'' and curvature is 3 q'' s''^2 +
 // 6 q''' s'' s'^2 + q'''' s'^4, and the cubic deviates by T^4/384 of that.
-double evenDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end) {
+double evenDeviation(const PathGrid& grid, std::size_t interval, double begin, double end) {
   double square = 0.0;
   for (std::size_t j = 0; j < grid.axes(); ++j) {
     const double change = grid.firstAtEnd(interval)[j] - grid.firstAtBegin(interval)[j];
@@ -507,11 +507,11 @@ double evenDeviation(const ContourGrid& grid, std::size_t interval, double begin
   return grid[interval].length * b * (r * r + b * r + b * b / 12.0) / 32.0;
 }
 
-// How far the middle of that cubic is from the contour [unit], at a right angle to the contour's
+// How far the middle of that cubic is from the path [unit], at a right angle to the path's
 // direction in the middle of the interval.
-double middleDeviation(const ContourGrid& grid, std::size_t interval, double begin, double end,
+double middleDeviation(const PathGrid& grid, std::size_t interval, double begin, double end,
                        double duration) {
-  const ContourPoint& middle = grid.evaluateMiddle(interval);
+  const PathPoint& middle = grid.evaluateMiddle(interval);
   const double eighth = duration / 8.0;
   double off_square = 0.0;
   double along = 0.0;
@@ -529,10 +529,10 @@ double middleDeviation(const ContourGrid& grid, std::size_t interval, double beg
 }
 
 // Whether an interval wastes time, unless it takes only a small part of its segment's, or deviates.
-bool isLong(std::size_t interval, double part, double deviation, const ContourGrid& grid,
-            ContourSpeed& speed, Knots& knots) {
+bool isLong(std::size_t interval, double part, double deviation, const PathGrid& grid,
+            Reachability& speed, Knots& knots) {
   if (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) return true;
-  if (part >= kSmallPart && wastesTime(speed, interval, knots.demandOf(interval))) return true;
+  if (part >= kSmallPart && wastesTime(speed, interval, knots.usageOf(interval))) return true;
   const double begin = knots.beginSpeed(interval);
   const double end = knots.endSpeed(interval);
   return evenDeviation(grid, interval, begin, end) > deviation ||
@@ -540,7 +540,7 @@ bool isLong(std::size_t interval, double part, double deviation, const ContourGr
 }
 
 // Divides the intervals that are too long, and those whose cubics are poor.
-bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots& knots) {
+bool divideLong(double deviation, PathGrid& grid, Reachability& speed, Knots& knots) {
   std::vector<bool> divided(grid.size(), false);
   std::vector<double> times(grid[grid.size() - 1].segment + 1, 0.0);  // of the segments
   for (std::size_t i = 0; i < grid.size(); ++i) times[grid[i].segment] += knots.duration(i);
@@ -548,7 +548,7 @@ bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots&
   for (std::size_t i = 0; i < grid.size(); ++i) {
     giveWayAt(i);
     if (grid[i].straight || knots.isSettled(i)) continue;
-    const bool poor = knots.demandOf(i).acceleration() > kPoorCubic;
+    const bool poor = knots.usageOf(i).acceleration() > kPoorCubic;
     if (poor) speed.checkBothEnds(i);
     const double part = knots.duration(i) / times[grid[i].segment];
     if (poor || isLong(i, part, deviation, grid, speed, knots)) {
@@ -566,12 +566,12 @@ bool divideLong(double deviation, ContourGrid& grid, ContourSpeed& speed, Knots&
 
 // Lowers the limits of the intervals of the cubics that exceed them, or has both ends of them
 // checked; returns the largest excess.
-Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, ContourSpeed& speed,
+Excess lowerLimits(double by_more, double poor, const PathGrid& grid, Reachability& speed,
                    Knots& knots) {
   Excess worst;
   for (std::size_t i = 1; i < knots.size(); ++i) {
-    const Demand demand = knots.demandBefore(i);
-    const Excess excess{std::max(1.0, demand.acceleration()), std::max(1.0, demand.speed)};
+    const CubicUsage usage = knots.usageBefore(i);
+    const Excess excess{std::max(1.0, usage.acceleration()), std::max(1.0, usage.speed)};
     worst.acceleration = std::max(worst.acceleration, excess.acceleration);
     worst.speed = std::max(worst.speed, excess.speed);
     if (excess.acceleration == 1.0 && excess.speed == 1.0) continue;
@@ -587,23 +587,23 @@ Excess lowerLimits(double by_more, double poor, const ContourGrid& grid, Contour
 }
 
 // The same motion, slower by a factor, at times of whole nanoseconds.
-std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid, double factor,
-                                    double ago) {
+std::vector<TimingKnot> slowedDown(const Knots& knots, const PathGrid& grid, double factor,
+                                   double ago) {
   const double last = knots.time(knots.size() - 1) * factor;
   if (!(last < Profile::kLongest)) {
     throw TooLong("the motion along the path would take longer than 4e9 s");
   }
-  std::vector<ContourKnot> made;
+  std::vector<TimingKnot> made;
   made.reserve(knots.size());
   for (std::size_t i = 0; i < knots.size(); ++i) {
     const double time = knots.time(i) * factor - ago;
-    ContourKnot& knot = made.emplace_back();
+    TimingKnot& knot = made.emplace_back();
     knot.time_ns = std::llround(time * 1e9);
     const double later = static_cast<double>(knot.time_ns) * 1e-9 - time;
     knot.segment = grid[knots.interval(i)].segment;
     knot.parameter = knots.parameter(i);
     knot.speed = knots.speed(i) / factor;
-    knot.may_begin = knots.isOnContour(i);
+    knot.may_begin = knots.isOnPath(i);
     knot.straight = i + 1 < knots.size() && knots.isStraight(i + 1);
     knot.positions.resize(grid.axes());
     knot.velocities.resize(grid.axes());
@@ -621,16 +621,16 @@ std::vector<ContourKnot> slowedDown(const Knots& knots, const ContourGrid& grid,
 struct Outcome {
   double excess = 1.0;
   double slowdown = 1.0;
-  double settled = 0.0;  // [s] see ContourPlan, of the motion that isn't slowed down
+  double settled = 0.0;  // [s] see PathTiming, of the motion that isn't slowed down
 };
 
-Outcome planKnots(const Contour& contour, const std::vector<ContourLimits>& limits,
-                  double begin_speed, ContourGrid& grid, Knots& knots) {
-  ContourSpeed speed(contour, grid, limits, begin_speed * begin_speed, CheckedAcceleration::kMean);
+Outcome planKnots(const Path& path, const std::vector<TimingLimits>& limits, double begin_speed,
+                  PathGrid& grid, Knots& knots) {
+  Reachability speed(path, grid, limits, begin_speed * begin_speed, CheckedAcceleration::kMean);
   for (int i = 0; i < kMostDivisions; ++i) {
     speed.plan();
     knots.findDurations(speed);
-    if (!divideLong(kMostDeviation * contour.resolution(), grid, speed, knots)) break;
+    if (!divideLong(kMostDeviation * path.resolution(), grid, speed, knots)) break;
   }
   // From a speed, what still exceeds the limits isn't slowed down afterwards.
   const bool from_speed = begin_speed > 0.0;
@@ -644,19 +644,19 @@ Outcome planKnots(const Contour& contour, const std::vector<ContourLimits>& limi
     Outcome outcome{std::max(excess.acceleration, excess.speed)};
     if (outcome.excess > 1.0 + kSmallExcess && plans < most_plans) continue;
     if (!from_speed) outcome.slowdown = std::max(std::sqrt(excess.acceleration), excess.speed);
-    outcome.settled = knots.timeAt(speed.settledUntil(grid.firstFrom(contour.openFrom())));
+    outcome.settled = knots.timeAt(speed.settledUntil(grid.firstFrom(path.openFrom())));
     return outcome;
   }
 }
 
 }  // namespace
 
-ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
-                        const ContourBegin& begin) {
-  ContourGrid grid(contour, begin.parameter, ContourGrid::kForAcceleration);
-  Knots knots(grid, limits, contour.resolution());
-  const Outcome outcome = planKnots(contour, limits, begin.speed, grid, knots);
-  ContourPlan plan;
+PathTiming planAccelerationLimited(const Path& path, const std::vector<TimingLimits>& limits,
+                                   const TimingStart& begin) {
+  PathGrid grid(path, begin.parameter, PathGrid::kForAcceleration);
+  Knots knots(grid, limits, path.resolution());
+  const Outcome outcome = planKnots(path, limits, begin.speed, grid, knots);
+  PathTiming plan;
   if (begin.speed > 0.0) {
     plan.excess = outcome.excess;
     // From a speed that is much too high, it may come to rest anywhere, and never end.

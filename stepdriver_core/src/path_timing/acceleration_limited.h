@@ -9,16 +9,16 @@
 
 namespace stepdriver::motion {
 
-/// The limits of one axis on a contour, all above 0 and finite but for the jerk [unit/s, unit/s^2].
-struct ContourLimits {
+/// The limits of one axis on a path, all above 0 and finite but for the jerk [unit/s, unit/s^2].
+struct TimingLimits {
   double speed = 0.0;
   double acceleration = 0.0;                              ///< while its speed rises
   double deceleration = 0.0;                              ///< while its speed falls
   double jerk = std::numeric_limits<double>::infinity();  ///< [unit/s^3] infinity: no limit
 };
 
-/// A place of a contour, the time at which the motion is there, and its velocity.
-struct ContourKnot {
+/// A place of a path, the time at which the motion is there, and its velocity.
+struct TimingKnot {
   std::int64_t time_ns = 0;
   std::size_t segment = 0;
   std::vector<double> positions;   ///< [unit]
@@ -26,34 +26,34 @@ struct ContourKnot {
   /// [unit/s^2] Empty if accelerations may jump.
   std::vector<double> accelerations;
   double parameter = 0.0;     ///< of the segment
-  double speed = 0.0;         ///< [unit/s] along the contour
-  double acceleration = 0.0;  ///< [unit/s^2] along the contour; 0 if accelerations may jump
-  /// Another contour can begin here: no corner before it is being rounded, or if accelerations may
+  double speed = 0.0;         ///< [unit/s] along the path
+  double acceleration = 0.0;  ///< [unit/s^2] along the path; 0 if accelerations may jump
+  /// Another path can begin here: no corner before it is being rounded, or if accelerations may
   /// not jump, the state of the motion here allows all that has been planned for the time after it.
   bool may_begin = false;
-  double average = 0.0;  ///< [s] the time over which planSmoothContour() averaged
+  double average = 0.0;  ///< [s] the time over which planJerkLimited() averaged
   /// On the way to the next knot, the segment of that one is straight, and the acceleration
   /// constant.
   bool straight = false;
 };
 
-/// The place and the speed at which a motion along a contour begins.
-struct ContourBegin {
+/// The place and the speed at which a motion along a path begins.
+struct TimingStart {
   double parameter = 0.0;  ///< of the first segment
-  double speed = 0.0;      ///< [unit/s] along the contour
+  double speed = 0.0;      ///< [unit/s] along the path
   /// @name Ignored if accelerations may jump
   /// @{
-  double acceleration = 0.0;  ///< [unit/s^2] along the contour
+  double acceleration = 0.0;  ///< [unit/s^2] along the path
   double average = 0.0;       ///< [s] of the motion so far; 0: unknown
   /// @}
   /// [s] How long ago the motion was exactly there; less than half a nanosecond.
   double ago = 0.0;
 };
 
-/// The motion along a contour.
-struct ContourPlan {
-  std::vector<ContourKnot> knots;  ///< the first one at time 0 and at the begin
-  /// Up to this time the motion is also the fastest one if the contour continues at its end,
+/// The motion along a path.
+struct PathTiming {
+  std::vector<TimingKnot> knots;  ///< the first one at time 0 and at the begin
+  /// Up to this time the motion is also the fastest one if the path continues at its end,
   /// however its corner there is rounded.
   std::int64_t settled_ns = 0;
   /// The segments at whose end it stops instead of rounding the corner, which would take longer: in
@@ -64,15 +64,15 @@ struct ContourPlan {
   double excess = 1.0;
 };
 
-/// The fastest motion along a contour to rest at its end, within the limits of the axes and the
+/// The fastest motion along a path to rest at its end, within the limits of the axes and the
 /// speeds of the segments. Jerk limits are ignored: accelerations jump. See
-/// planSmoothContour().
+/// planJerkLimited().
 ///
 /// The axes move on the cubics that have the positions and velocities of the knots at both ends.
-/// Between knots they are within a tenth of the resolution of the contour. In the whole of each
+/// Between knots they are within a tenth of the resolution of the path. In the whole of each
 /// cubic, velocities and accelerations are within the limits, apart from rounding.
 ///
-/// The contour is divided at places between which its direction turns by little, and straight parts
+/// The path is divided at places between which its direction turns by little, and straight parts
 /// aren't divided. With x = s'^2 as a function of the length s, the limits are linear in x and s'':
 ///
 ///     -a <= q'(s) s'' + q''(s) x <= a,   q'(s)^2 x <= v^2
@@ -97,7 +97,7 @@ struct ContourPlan {
 /// @param limits one for each axis.
 /// @return no knots if it begins at a speed from which it needs 1 % more than a limit.
 /// @throw motion::TooLong if it takes Profile::kLongest or longer.
-ContourPlan planContour(const Contour& contour, const std::vector<ContourLimits>& limits,
-                        const ContourBegin& begin = {});
+PathTiming planAccelerationLimited(const Path& path, const std::vector<TimingLimits>& limits,
+                                   const TimingStart& begin = {});
 
 }  // namespace stepdriver::motion

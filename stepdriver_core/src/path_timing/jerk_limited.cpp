@@ -34,24 +34,24 @@ constexpr double kSquareRounding = 1e-9;  // of the square of a speed
 constexpr double kNoDifference = 1e-6;
 constexpr double kLowerMoreBy = 2e-3;  // at first, than by what exceeds a limit
 constexpr double kLowerMostMoreBy = 0.1;
-constexpr double kShorterBy = 0.7;             // the time of the average
-constexpr double kShortestAverage = 1e-3;      // s
-constexpr double kMostSmoothDeviation = 0.05;  // of the resolution
-constexpr double kNearFoot = 1e-3;             // of the resolution
+constexpr double kShorterBy = 0.7;              // the time of the average
+constexpr double kShortestAverage = 1e-3;       // s
+constexpr double kMostQuinticDeviation = 0.05;  // of the resolution
+constexpr double kNearFoot = 1e-3;              // of the resolution
 constexpr int kMostDivisionRounds = 4;
 constexpr std::size_t kPartsOfDivision = 4;
 
 // The motion between two stops, or from a speed to a stop.
-class SmoothSection {
+class JerkLimitedSection {
  public:
-  SmoothSection(const Contour& contour, const std::vector<ContourLimits>& limits,
-                const ContourBegin& begin)
-      : contour_(contour), limits_(limits), begin_(begin), grid_(contour, begin.parameter) {
+  JerkLimitedSection(const Path& path, const std::vector<TimingLimits>& limits,
+                     const TimingStart& begin)
+      : path_(path), limits_(limits), begin_(begin), grid_(path, begin.parameter) {
     findCaps();
   }
 
   struct Plan {
-    SmoothKnots knots;
+    JerkLimitedKnots knots;
     std::vector<std::size_t> segments;  // of the knots
     std::vector<bool> straight;         // the way to the next knot, at constant acceleration
     double time = 0.0;                  // of the average
@@ -77,11 +77,11 @@ class SmoothSection {
     double fastest = 0.0;
     double slowest = kUnlimited;
     for (std::size_t i = grid_.firstFrom({corner, 0.0}); i < grid_.size(); ++i) {
-      const ContourGrid::Interval& interval = grid_[i];
+      const PathGrid::Interval& interval = grid_[i];
       if (interval.segment > corner + 1) break;
       const bool before = interval.segment == corner;
-      const bool rounded = before ? interval.to > contour_.roundedFrom(corner)
-                                  : interval.from < contour_.roundedUntil(corner + 1);
+      const bool rounded = before ? interval.to > path_.roundedFrom(corner)
+                                  : interval.from < path_.roundedUntil(corner + 1);
       length += interval.length;
       jerk = std::max(jerk, highestJerk(grid_, i, limits_, 0.0));
       fastest = std::max(fastest, caps_[i].value);
@@ -90,7 +90,7 @@ class SmoothSection {
     return 2.0 * slowest < std::min(fastest, std::cbrt(length * length * jerk / 4.0));
   }
 
-  // Divides intervals in which quintics would deviate from the contour.
+  // Divides intervals in which quintics would deviate from the path.
   Plan fastest() {
     for (int i = 0;; ++i) {
       Plan best = bestOfTimes();
@@ -129,13 +129,13 @@ class SmoothSection {
   }
   bool moves() const { return begin_.speed > 0.0; }
   static Plan impossible(std::size_t axes) {
-    Plan plan{SmoothKnots(axes), {}, {}};
+    Plan plan{JerkLimitedKnots(axes), {}, {}};
     plan.excess = kUnlimited;
     return plan;
   }
 
   void findCaps() {
-    const ContourSpeed speed(contour_, grid_, limits_);
+    const Reachability speed(path_, grid_, limits_);
     caps_.clear();
     double distance = 0.0;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
@@ -152,11 +152,11 @@ class SmoothSection {
   }
 
   // [s] See kLargestRounding. @param time of the average [s].
-  double closestKnots(const std::vector<SmoothPart>& parts, double time) const {
+  double closestKnots(const std::vector<AveragedPart>& parts, double time) const {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double duration = parts.back().time;
     double speed = 0.0;
-    for (const SmoothPart& part : parts) speed = std::max(speed, part.speed);
+    for (const AveragedPart& part : parts) speed = std::max(speed, part.speed);
     double closest = 9.0 * std::max(0.5e-9, kEpsilon * duration) / kMostRoundingOfTimes;
     // The speed is a difference of places at times that are rounded.
     const double speed_rounding = kEpsilon * duration * speed / time;
@@ -178,23 +178,23 @@ class SmoothSection {
   }
 
   // How far the middle of the quintic that ends at a knot is from an interval, at a right angle.
-  double deviationOf(const SmoothKnots& knots, std::size_t index, std::size_t interval,
-                     double distance, ContourPoint& point) const {
+  double deviationOf(const JerkLimitedKnots& knots, std::size_t index, std::size_t interval,
+                     double distance, PathPoint& point) const {
     const double h = knots[index].time - knots[index - 1].time;
-    const ContourGrid::Interval& of = grid_[interval];
+    const PathGrid::Interval& of = grid_[interval];
     const double part = (distance - caps_[interval].from) / of.length;
     double parameter = of.from + std::clamp(part, 0.0, 1.0) * (of.to - of.from);
     double square = 0.0;
     constexpr int kProjections = 4;
     for (int i = 0; i < kProjections; ++i) {
-      contour_.evaluate(of.segment, parameter, point);
+      path_.evaluate(of.segment, parameter, point);
       double along = 0.0;
       double rate = 0.0;  // squared, as the two others
       double turn = 0.0;
       square = 0.0;
       for (std::size_t j = 0; j < limits_.size(); ++j) {
-        const SmoothKnots::State& begin = knots.state(index - 1, j);
-        const SmoothKnots::State& end = knots.state(index, j);
+        const JerkLimitedKnots::State& begin = knots.state(index - 1, j);
+        const JerkLimitedKnots::State& end = knots.state(index, j);
         const double off = (begin.position + end.position) / 2.0 +
                            h * (5.0 / 32.0 * (begin.velocity - end.velocity) +
                                 h * (begin.acceleration + end.acceleration) / 64.0) -
@@ -207,23 +207,23 @@ class SmoothSection {
       square -= along * along / rate;
       const double change = along / rate;  // of the parameter
       parameter = std::clamp(parameter + change, of.from, of.to);
-      // Nearer to the foot, the contour is where its tangent is.
-      if (std::sqrt(turn) * change * change < kNearFoot * contour_.resolution()) break;
+      // Nearer to the foot, the path is where its tangent is.
+      if (std::sqrt(turn) * change * change < kNearFoot * path_.resolution()) break;
     }
     return std::sqrt(std::max(0.0, square));
   }
 
-  bool findDeviations(const SmoothKnots& knots, std::vector<bool>& deviates) const {
+  bool findDeviations(const JerkLimitedKnots& knots, std::vector<bool>& deviates) const {
     bool found = false;
     std::size_t interval = 0;
-    ContourPoint point;
+    PathPoint point;
     for (std::size_t i = 1; i < knots.size(); ++i) {
       giveWayAt(i);
       const double middle = (knots[i - 1].distance + knots[i].distance) / 2.0;
       while (interval + 1 < grid_.size() && caps_[interval].to < middle) ++interval;
       if (grid_[interval].straight) continue;
       if (deviationOf(knots, i, interval, middle, point) <
-          kMostSmoothDeviation * contour_.resolution())
+          kMostQuinticDeviation * path_.resolution())
         continue;
       deviates[interval] = found = true;
     }
@@ -234,7 +234,7 @@ class SmoothSection {
   // longer, apart from what a plan is slowed down by as a whole.
   class Rounds {
    public:
-    Rounds(const SmoothSection& section, double time)
+    Rounds(const JerkLimitedSection& section, double time)
         : section_(&section), time_(time), best_(section.planOnce(time, lowered_)) {
       see(best_);
     }
@@ -263,7 +263,7 @@ class SmoothSection {
       shortest_ = planned ? plan.knots.back().time : kUnlimited;
     }
 
-    const SmoothSection* section_;
+    const JerkLimitedSection* section_;
     double time_;
     Lowered lowered_;
     Plan best_;
@@ -320,7 +320,7 @@ class SmoothSection {
     }
   }
 
-  double capOf(std::size_t interval, const ContourSpeed& speed) const;
+  double capOf(std::size_t interval, const Reachability& speed) const;
 
   // Adds to what is lowered.
   Plan planOnce(double time, Lowered& lowered) const {
@@ -353,12 +353,12 @@ class SmoothSection {
                accelerations.places().end(), std::back_inserter(cuts));
     if (moves())
       cuts.insert(std::upper_bound(cuts.begin(), cuts.end(), averaged_until), averaged_until);
-    const ContourGrid grid = grid_.divided(cuts);
-    std::optional<ContourGrid> rest;
+    const PathGrid grid = grid_.divided(cuts);
+    std::optional<PathGrid> rest;
     if (moves()) rest.emplace(grid.after(history.end));
-    const ContourGrid& ahead = rest ? *rest : grid;
+    const PathGrid& ahead = rest ? *rest : grid;
     const double begin_square = history.end_speed * history.end_speed;
-    ContourSpeed speed(contour_, ahead, limits_, begin_square);
+    Reachability speed(path_, ahead, limits_, begin_square);
     double begin = history.end;
     for (std::size_t i = 0; i < ahead.size(); ++i) {
       giveWayAt(i);
@@ -383,20 +383,19 @@ class SmoothSection {
     if (moves() && !keepPast(places, past, {history.end, begin_square})) {
       return impossible(limits_.size());
     }
-    const std::vector<SmoothPart> parts = smoothed(places, time, moves());
-    Plan plan{
-        makeKnots(grid, limits_, parts, time, closestKnots(parts, time), contour_.resolution()),
-        {},
-        {}};
+    const std::vector<AveragedPart> parts = movingAverage(places, time, moves());
+    Plan plan{makeKnots(grid, limits_, parts, time, closestKnots(parts, time), path_.resolution()),
+              {},
+              {}};
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
       plan.segments.push_back(grid[plan.knots[i].interval].segment);
       plan.straight.push_back(i + 1 < plan.knots.size() && isEven(plan.knots, i, parts, grid));
     }
-    const SmoothDemand demand = lower(plan.knots, parts, grid, lowered);
+    const LimitUsage usage = lower(plan.knots, parts, grid, lowered);
     if (moves()) {
-      plan.excess = demand.most();
+      plan.excess = usage.most();
     } else {
-      plan.slowdown = demand.slowdown();
+      plan.slowdown = usage.slowdown();
     }
     plan.time = time;
     const double settled = settledIn(ahead, history.end, time, speed);
@@ -431,10 +430,10 @@ class SmoothSection {
   }
 
   // Whether the way to the next knot is straight, at constant acceleration.
-  static bool isEven(const SmoothKnots& knots, std::size_t index,
-                     const std::vector<SmoothPart>& parts, const ContourGrid& grid) {
-    const SmoothKnots::Knot& from = knots[index];
-    const SmoothKnots::Knot& to = knots[index + 1];
+  static bool isEven(const JerkLimitedKnots& knots, std::size_t index,
+                     const std::vector<AveragedPart>& parts, const PathGrid& grid) {
+    const JerkLimitedKnots::Knot& from = knots[index];
+    const JerkLimitedKnots::Knot& to = knots[index + 1];
     if (!from.even) return false;
     for (std::size_t k = from.part; k < to.part; ++k) {
       if (!parts[k + 1].even || parts[k].jerk != 0.0) return false;
@@ -448,14 +447,14 @@ class SmoothSection {
     return true;
   }
 
-  // [unit] The place after which the averaged motion depends on what follows the contour, apart
+  // [unit] The place after which the averaged motion depends on what follows the path, apart
   // from peaks.
-  double settledIn(const ContourGrid& grid, double begin, double time, ContourSpeed& speed) const {
-    const Contour::Place open = contour_.openFrom();
+  double settledIn(const PathGrid& grid, double begin, double time, Reachability& speed) const {
+    const Path::Place open = path_.openFrom();
     double lowest = kUnlimited;  // that will be higher
     double from = kUnlimited;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
-      const ContourGrid::Interval& interval = grid_[i];
+      const PathGrid::Interval& interval = grid_[i];
       const bool before = interval.segment < open.segment ||
                           (interval.segment == open.segment && interval.to <= open.parameter);
       if (before) continue;
@@ -471,7 +470,7 @@ class SmoothSection {
     return distance;
   }
 
-  // The begin of the last peak before a distance if that has been lowered: if the contour
+  // The begin of the last peak before a distance if that has been lowered: if the path
   // continues, it may be higher.
   static double beforePeak(const std::vector<SpeedPlace>& given,
                            const std::vector<SpeedPlace>& flattened, double distance) {
@@ -488,14 +487,14 @@ class SmoothSection {
   }
 
   // [s] When the given motion comes to a distance.
-  static double timeBefore(const std::vector<SmoothPart>& parts, double distance) {
+  static double timeBefore(const std::vector<AveragedPart>& parts, double distance) {
     const auto later =
         std::upper_bound(parts.begin() + 1, parts.end(), distance,
-                         [](double x, const SmoothPart& part) { return x < part.front; });
+                         [](double x, const AveragedPart& part) { return x < part.front; });
     return (later - 1)->time;
   }
 
-  static std::vector<SpeedPlace> placesOf(const ContourGrid& grid, const ContourSpeed& speed,
+  static std::vector<SpeedPlace> placesOf(const PathGrid& grid, const Reachability& speed,
                                           double begin) {
     std::vector<SpeedPlace> places{{begin, speed.square(0)}};
     places.reserve(3 * grid.size());
@@ -505,7 +504,7 @@ class SmoothSection {
     for (std::size_t i = 0; i < grid.size(); ++i) {
       const double end = begin + grid[i].length;
       if (grid[i].straight) {
-        const ContourSpeed::Ramp ramp = speed.ramp(i);
+        const Reachability::Ramp ramp = speed.ramp(i);
         const double peak = speed.peakSquare(i);
         // Rounding makes a way of its own out of a ramp that hardly rises.
         append(std::min(end, begin + (peak - speed.square(i)) / (2.0 * ramp.up)), peak);
@@ -517,25 +516,25 @@ class SmoothSection {
     return places;
   }
 
-  SmoothDemand lower(const SmoothKnots& knots, const std::vector<SmoothPart>& parts,
-                     const ContourGrid& grid, Lowered& lowered) const {
+  LimitUsage lower(const JerkLimitedKnots& knots, const std::vector<AveragedPart>& parts,
+                   const PathGrid& grid, Lowered& lowered) const {
     double steepest = 0.0;
-    for (const SmoothPart& part : parts) {
+    for (const AveragedPart& part : parts) {
       steepest = std::max(steepest, std::abs(part.front_acceleration));
     }
     const double more = 1.0 + lowered.more;
     lowered.more = std::min(2.0 * lowered.more, kLowerMostMoreBy);
-    SmoothDemand worst;
+    LimitUsage worst;
     for (std::size_t i = 1; i < knots.size(); ++i) {
       giveWayAt(i);
-      SmoothDemand demand;
+      LimitUsage usage;
       for (std::size_t j = 0; j < limits_.size(); ++j) {
-        demand.include(demandOf(knots.state(i - 1, j), knots.state(i, j),
-                                knots[i].time - knots[i - 1].time, limits_[j]));
+        usage.include(usageOf(knots.state(i - 1, j), knots.state(i, j),
+                              knots[i].time - knots[i - 1].time, limits_[j]));
       }
-      worst.include(demand);
-      if (demand.most() < 1.0 + kNoDifference) continue;
-      const double slowdown = demand.slowdown();
+      worst.include(usage);
+      if (usage.most() < 1.0 + kNoDifference) continue;
+      const double slowdown = usage.slowdown();
       const double speed = std::max(knots[i - 1].speed, knots[i].speed);
       bool straight = true;
       for (std::size_t k = knots[i - 1].interval; k <= knots[i].interval; ++k) {
@@ -549,13 +548,12 @@ class SmoothSection {
         acceleration = std::max({acceleration, std::abs(parts[k].rear_acceleration),
                                  std::abs(parts[k].front_acceleration)});
       }
-      if (!straight || demand.speed > 1.0) {
+      if (!straight || usage.speed > 1.0) {
         lowered.speeds.push_back({knots[i - 1].distance, knots[i].distance,
-                                  speed / ((straight ? demand.speed : slowdown) * more)});
+                                  speed / ((straight ? usage.speed : slowdown) * more)});
       }
       if (acceleration > kNoDifference * steepest) {
-        const double by =
-            straight ? std::max(demand.acceleration, demand.jerk) : slowdown * slowdown;
+        const double by = straight ? std::max(usage.acceleration, usage.jerk) : slowdown * slowdown;
         lowered.accelerations.push_back(
             {parts[knots[i - 1].part].rear, parts[last].front, acceleration / (by * more)});
       }
@@ -582,18 +580,18 @@ class SmoothSection {
   // The places of another grid, and what was lowered for it, make such a difference to a speed.
   static constexpr double kMostOver = 1.01;
 
-  const Contour& contour_;
-  const std::vector<ContourLimits>& limits_;
-  const ContourBegin& begin_;
-  ContourGrid grid_;
+  const Path& path_;
+  const std::vector<TimingLimits>& limits_;
+  const TimingStart& begin_;
+  PathGrid grid_;
   std::vector<CeilingSpan> caps_;  // of the speed, of each interval
 };
 
 // [unit/s] The highest constant speed along an interval.
-double SmoothSection::capOf(std::size_t interval, const ContourSpeed& speed) const {
+double JerkLimitedSection::capOf(std::size_t interval, const Reachability& speed) const {
   double cap = std::sqrt(std::min(speed.capAtBegin(interval), speed.capAtEnd(interval)));
   if (grid_[interval].straight) return cap;
-  ContourPoint middle;
+  PathPoint middle;
   const double length = grid_[interval].length;
   grid_.evaluateAt(interval, length / 2.0, middle);
   for (std::size_t j = 0; j < limits_.size(); ++j) {
@@ -611,7 +609,7 @@ double SmoothSection::capOf(std::size_t interval, const ContourSpeed& speed) con
   return cap;
 }
 
-// The motion between two stops of the contour, which may also stop at corners on the way instead of
+// The motion between two stops of the path, which may also stop at corners on the way instead of
 // rounding them: if that is faster.
 class StopChoice {
  public:
@@ -619,29 +617,28 @@ class StopChoice {
   struct Run {
     std::size_t first = 0;
     std::size_t last = 0;
-    SmoothSection::Plan plan;
+    JerkLimitedSection::Plan plan;
   };
 
-  StopChoice(const Contour& contour, const std::vector<ContourLimits>& limits,
-             const ContourBegin& begin)
-      : contour_(contour), limits_(limits), begin_(begin) {}
+  StopChoice(const Path& path, const std::vector<TimingLimits>& limits, const TimingStart& begin)
+      : path_(path), limits_(limits), begin_(begin) {}
 
   std::vector<Run> fastest() const {
-    SmoothSection section(contour_, limits_, begin_);
+    JerkLimitedSection section(path_, limits_, begin_);
     std::vector<std::size_t> corners;
-    for (std::size_t i = 0; i + 1 < contour_.size(); ++i) {
-      if (contour_.isSeparate(i) && section.mayStopAt(i)) corners.push_back(i);
+    for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
+      if (path_.isSeparate(i) && section.mayStopAt(i)) corners.push_back(i);
     }
-    Run whole{0, contour_.size() - 1, section.fastest()};
+    Run whole{0, path_.size() - 1, section.fastest()};
     if (!whole.plan.possible()) corners.clear();
-    return choose(contour_, std::move(whole), stoppingAt(std::move(corners)));
+    return choose(path_, std::move(whole), stoppingAt(std::move(corners)));
   }
 
  private:
-  Run planned(const Contour& contour, std::size_t first, std::size_t last) const {
-    const Contour part = contour.part(first, last);
-    const ContourBegin begin = first == 0 ? begin_ : ContourBegin{};
-    return {first, last, SmoothSection(part, limits_, begin).fastest()};
+  Run planned(const Path& path, std::size_t first, std::size_t last) const {
+    const Path part = path.part(first, last);
+    const TimingStart begin = first == 0 ? begin_ : TimingStart{};
+    return {first, last, JerkLimitedSection(part, limits_, begin).fastest()};
   }
 
   // The runs from one corner to the next. Those at which a motion that begins at a speed can't stop
@@ -649,7 +646,7 @@ class StopChoice {
   std::vector<Run> stoppingAt(std::vector<std::size_t> corners) const {
     std::vector<Run> runs;
     for (std::size_t left_out = 1; runs.empty() && !corners.empty(); left_out *= 2) {
-      Run run = planned(contour_.withStops(corners), 0, corners.front());
+      Run run = planned(path_.withStops(corners), 0, corners.front());
       if (run.plan.possible()) {
         runs.push_back(std::move(run));
       } else {
@@ -658,17 +655,17 @@ class StopChoice {
       }
     }
     if (corners.empty()) return runs;
-    const Contour contour = contour_.withStops(corners);
+    const Path path = path_.withStops(corners);
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      const std::size_t end = i + 1 < corners.size() ? corners[i + 1] : contour_.size() - 1;
-      runs.push_back(planned(contour, corners[i] + 1, end));
+      const std::size_t end = i + 1 < corners.size() ? corners[i + 1] : path_.size() - 1;
+      runs.push_back(planned(path, corners[i] + 1, end));
     }
     return runs;
   }
 
-  // @param contour with the stops that have been chosen. @param stopping the runs from one corner
+  // @param path with the stops that have been chosen. @param stopping the runs from one corner
   //   to the next along the way of `whole`.
-  std::vector<Run> choose(const Contour& contour, Run whole, std::vector<Run> stopping) const {
+  std::vector<Run> choose(const Path& path, Run whole, std::vector<Run> stopping) const {
     double duration = 0.0;
     for (const Run& run : stopping) duration += run.plan.duration();
     std::vector<Run> chosen;
@@ -681,7 +678,7 @@ class StopChoice {
     for (std::size_t i = 0; i + 1 < stopping.size(); ++i) {
       if (stops[i]) corners.push_back(stopping[i].last);
     }
-    const Contour stopped = contour.withStops(corners);
+    const Path stopped = path.withStops(corners);
     std::vector<Run> between;  // two stops
     for (std::size_t i = 0; i < stopping.size(); ++i) {
       between.push_back(std::move(stopping[i]));
@@ -714,7 +711,7 @@ class StopChoice {
 
   // [s] How long a motion takes for the segments of a run.
   static double timeIn(const Run& whole, const Run& run) {
-    const SmoothSection::Plan& plan = whole.plan;
+    const JerkLimitedSection::Plan& plan = whole.plan;
     const auto end_of = [&](std::size_t segment) {
       const auto later =
           std::upper_bound(plan.segments.begin() + 1, plan.segments.end(), segment - whole.first);
@@ -724,27 +721,28 @@ class StopChoice {
     return (end_of(run.last) - begin) * plan.slowdown;
   }
 
-  const Contour& contour_;
-  const std::vector<ContourLimits>& limits_;
-  const ContourBegin& begin_;
+  const Path& path_;
+  const std::vector<TimingLimits>& limits_;
+  const TimingStart& begin_;
 };
 
 // The end of a segment, at rest.
-ContourKnot restAtEnd(const Contour& contour, std::size_t segment) {
-  ContourPoint end;
-  contour.evaluate(segment, 1.0, end);
-  ContourKnot knot;
+TimingKnot restAtEnd(const Path& path, std::size_t segment) {
+  PathPoint end;
+  path.evaluate(segment, 1.0, end);
+  TimingKnot knot;
   knot.segment = segment;
   knot.positions = std::move(end.position);
-  knot.velocities.assign(contour.axes(), 0.0);
-  knot.accelerations.assign(contour.axes(), 0.0);
+  knot.velocities.assign(path.axes(), 0.0);
+  knot.accelerations.assign(path.axes(), 0.0);
   knot.parameter = 1.0;
   knot.may_begin = true;
   return knot;
 }
 
-// Appends a motion to rest. @param ago see ContourBegin.
-void appendRun(const SmoothSection::Plan& plan, std::size_t first, double ago, ContourPlan& made) {
+// Appends a motion to rest. @param ago see TimingStart.
+void appendRun(const JerkLimitedSection::Plan& plan, std::size_t first, double ago,
+               PathTiming& made) {
   const std::int64_t begin_ns = made.knots.empty() ? 0 : made.knots.back().time_ns;
   const double end = static_cast<double>(begin_ns) * 1e-9 + plan.duration();
   if (!(end < Profile::kLongest)) {
@@ -753,11 +751,11 @@ void appendRun(const SmoothSection::Plan& plan, std::size_t first, double ago, C
   const double factor = plan.slowdown;
   made.settled_ns = begin_ns + std::llround(plan.settled * factor * 1e9);
   for (std::size_t i = made.knots.empty() ? 0 : 1; i < plan.knots.size(); ++i) {
-    const SmoothKnots::Knot& planned = plan.knots[i];
+    const JerkLimitedKnots::Knot& planned = plan.knots[i];
     const double time = planned.time * factor - ago;
     const std::int64_t time_ns = std::llround(time * 1e9);
     const double later = static_cast<double>(time_ns) * 1e-9 - time;
-    ContourKnot knot;
+    TimingKnot knot;
     knot.time_ns = begin_ns + time_ns;
     knot.segment = first + plan.segments[i];
     knot.parameter = planned.parameter;
@@ -767,7 +765,7 @@ void appendRun(const SmoothSection::Plan& plan, std::size_t first, double ago, C
     knot.average = plan.time * factor;
     knot.straight = plan.straight[i];
     for (std::size_t j = 0; j < plan.knots.axes(); ++j) {
-      const SmoothKnots::State& state = plan.knots.state(i, j);
+      const JerkLimitedKnots::State& state = plan.knots.state(i, j);
       const double velocity = state.velocity / factor;
       const double acceleration = state.acceleration / (factor * factor);
       knot.positions.push_back(state.position + later * (velocity + later * acceleration / 2.0));
@@ -780,21 +778,21 @@ void appendRun(const SmoothSection::Plan& plan, std::size_t first, double ago, C
 
 }  // namespace
 
-ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourLimits>& limits,
-                              const ContourBegin& begin) {
-  ContourPlan made;
-  ContourBegin from = begin;
-  for (std::size_t first = 0; first < contour.size();) {
+PathTiming planJerkLimited(const Path& path, const std::vector<TimingLimits>& limits,
+                           const TimingStart& begin) {
+  PathTiming made;
+  TimingStart from = begin;
+  for (std::size_t first = 0; first < path.size();) {
     std::size_t last = first;
-    while (last + 1 < contour.size() && !contour.stopsAfter(last)) ++last;
+    while (last + 1 < path.size() && !path.stopsAfter(last)) ++last;
     if (first == last && from.parameter > 1.0 - kNoPart) {  // it begins at a stop
       if (from.speed > 0.0) made.excess = kUnlimited;
-      made.knots.push_back(restAtEnd(contour, first));
+      made.knots.push_back(restAtEnd(path, first));
       from = {};
       ++first;
       continue;
     }
-    const Contour part = contour.part(first, last);
+    const Path part = path.part(first, last);
     const std::vector<StopChoice::Run> runs = StopChoice(part, limits, from).fastest();
     for (const StopChoice::Run& run : runs) {
       made.excess = std::max(made.excess, run.plan.excess);

@@ -7,16 +7,16 @@
 
 namespace stepdriver::motion {
 
-/// A motion along a contour to rest at its end, within the limits of the axes, including their
+/// A motion along a path to rest at its end, within the limits of the axes, including their
 /// jerk, and the speeds of the segments.
 ///
 /// The axes move on the quintics that have the positions, velocities and accelerations of the knots
 /// at both ends. In the whole of each quintic, velocities, accelerations and jerks are within the
 /// limits, apart from rounding.
 ///
-/// Between two stops, the motion is a moving average of a faster one (see smoothed()): only its
-/// time is changed, so it stays on the contour. The faster one is planned as by planContour(), with
-/// these changes, where T is the time of the average:
+/// Between two stops, the motion is a moving average of a faster one (see movingAverage()): only
+/// its time is changed, so it stays on the path. The faster one is planned as by
+/// planAccelerationLimited(), with these changes, where T is the time of the average:
 /// - Its speed is also limited by the jerk |q'''(s)| s'^3 and by the acceleration |q''(s)| s'^2,
 ///   and these limits c count within c T/2 of the place: the average is within c then.
 /// - |q'(s)| s'' is limited by T times the jerk limit.
@@ -31,7 +31,7 @@ namespace stepdriver::motion {
 /// rounds and of several T is taken.
 ///
 /// If a corner would have to be passed so slowly that a stop takes less time, the motion stops
-/// there, and the corner isn't rounded (ContourPlan::stops): no motion takes longer than with a
+/// there, and the corner isn't rounded (PathTiming::stops): no motion takes longer than with a
 /// stop at each corner.
 ///
 /// If it begins at a speed v and an acceleration a, the average first contains a motion at the
@@ -39,14 +39,14 @@ namespace stepdriver::motion {
 /// begin: it ended v T/2 + a T^2/12 after the begin, at the speed v + a T/2. So the jerk may jump
 /// there, but nothing else does, and T needn't be that of the motion so far. The faster motion can
 /// do from there whatever was planned if the one so far had the acceleration a for the last T:
-/// those knots may be begins of other contours. Each of its highest and lowest speeds has one.
+/// those knots may be begins of other paths. Each of its highest and lowest speeds has one.
 ///
-/// @param contour with a continuous curvature. @param limits one for each axis, at least one with a
+/// @param path with a continuous curvature. @param limits one for each axis, at least one with a
 ///   jerk limit.
 /// @param begin its acceleration isn't 0 only if its speed isn't.
 /// @return not all knots if it begins at a speed from which it needs more than a limit.
 /// @throw motion::TooLong if it takes Profile::kLongest or longer.
-ContourPlan planSmoothContour(const Contour& contour, const std::vector<ContourLimits>& limits,
-                              const ContourBegin& begin = {});
+PathTiming planJerkLimited(const Path& path, const std::vector<TimingLimits>& limits,
+                           const TimingStart& begin = {});
 
 }  // namespace stepdriver::motion

@@ -18,7 +18,7 @@ constexpr double kPeanoKernel = 0.0173;
 constexpr double kMostJerkDeviation = 0.01;  // of the resolution, of that
 
 // When a part of a smoothed motion has moved by a distance [s], before it ends.
-double timeUntilMoved(const SmoothPart& part, double distance, double duration) {
+double timeUntilMoved(const AveragedPart& part, double distance, double duration) {
   double low = 0.0;
   double high = duration;
   double h = duration / 2.0;
@@ -37,8 +37,8 @@ double timeUntilMoved(const SmoothPart& part, double distance, double duration) 
 
 class KnotMaker {
  public:
-  KnotMaker(const ContourGrid& grid, const std::vector<ContourLimits>& limits,
-            const std::vector<SmoothPart>& parts, double time, double closest, double resolution)
+  KnotMaker(const PathGrid& grid, const std::vector<TimingLimits>& limits,
+            const std::vector<AveragedPart>& parts, double time, double closest, double resolution)
       : grid_(grid),
         limits_(limits),
         parts_(parts),
@@ -48,12 +48,12 @@ class KnotMaker {
         last_(parts.back().time - closest),
         knots_(grid.axes()) {}
 
-  SmoothKnots make() {
+  JerkLimitedKnots make() {
     appendPlace(0, parts_.front(), 0.0, 0);
     for (std::size_t k = 0; k + 1 < parts_.size(); ++k) {
       giveWayAt(k);
       beginPart(k);
-      const SmoothPart& next = parts_[k + 1];
+      const AveragedPart& next = parts_[k + 1];
       while (interval_ + 1 < grid_.size() && begin_ + grid_[interval_].length < next.distance) {
         passInterval(k);
       }
@@ -70,7 +70,7 @@ class KnotMaker {
 
   // From the interval that contains the motion to the next one, in a part.
   void passInterval(std::size_t index) {
-    const SmoothPart& part = parts_[index];
+    const AveragedPart& part = parts_[index];
     const double duration = parts_[index + 1].time - part.time;
     const bool from_straight = grid_[interval_].straight;
     const bool to_straight = grid_[interval_ + 1].straight;
@@ -90,7 +90,7 @@ class KnotMaker {
   }
 
   void beginPart(std::size_t index) {
-    const SmoothPart& part = parts_[index];
+    const AveragedPart& part = parts_[index];
     const bool becomes_even = index > 0 && part.even && !parts_[index - 1].even;
     const double duration = parts_[index + 1].time - part.time;
     const double jump = index > 0 ? jumpBefore(index) : 0.0;
@@ -113,8 +113,8 @@ class KnotMaker {
 
   // [unit/s^2] Of the acceleration: the part in which it changes is shorter than rounded times are.
   double jumpBefore(std::size_t index) const {
-    const SmoothPart& before = parts_[index - 1];
-    const SmoothPart& part = parts_[index];
+    const AveragedPart& before = parts_[index - 1];
+    const AveragedPart& part = parts_[index];
     return std::abs(part.acceleration - stateOf(before, part.time - before.time).acceleration);
   }
 
@@ -148,7 +148,7 @@ class KnotMaker {
 
   // In a part, before the end of the interval that contains the motion.
   void appendWithin(std::size_t index, double time) {
-    const SmoothPart& part = parts_[index];
+    const AveragedPart& part = parts_[index];
     const State state = stateOf(part, time - part.time);
     const double parameter = grid_.evaluateAt(interval_, state.distance - begin_, point_);
     append({time, state.distance, state.speed, interval_, index, parameter, state.acceleration,
@@ -156,7 +156,7 @@ class KnotMaker {
            point_.position.data(), point_.first.data(), point_.second.data());
   }
 
-  void appendPlace(std::size_t place, const SmoothPart& part, double h, std::size_t index) {
+  void appendPlace(std::size_t place, const AveragedPart& part, double h, std::size_t index) {
     const std::size_t before = place == 0 ? 0 : place - 1;
     const double* first = place == 0 ? grid_.firstAtBegin(0) : grid_.firstAtEnd(before);
     const double* second = place == 0 ? grid_.secondAtBegin(0) : grid_.secondAtEnd(before);
@@ -166,7 +166,7 @@ class KnotMaker {
            grid_.position(place), first, second);
   }
 
-  void append(const SmoothKnots::Knot& knot, const double* position, const double* first,
+  void append(const JerkLimitedKnots::Knot& knot, const double* position, const double* first,
               const double* second) {
     knots_.append(knot, position, first, second);
     jerk_ = parts_[knot.part].jerk;
@@ -179,7 +179,7 @@ class KnotMaker {
     double speed = 0.0;
     double acceleration = 0.0;
   };
-  static State stateOf(const SmoothPart& part, double h) {
+  static State stateOf(const AveragedPart& part, double h) {
     return {part.distance + h * (part.speed + h * (part.acceleration / 2.0 + h * part.jerk / 6.0)),
             part.speed + h * (part.acceleration + h * part.jerk / 2.0),
             part.acceleration + h * part.jerk};
@@ -188,15 +188,15 @@ class KnotMaker {
     return parts_[index].even && (h == 0.0 || parts_[index + 1].even);
   }
 
-  const ContourGrid& grid_;
-  const std::vector<ContourLimits>& limits_;
-  const std::vector<SmoothPart>& parts_;
+  const PathGrid& grid_;
+  const std::vector<TimingLimits>& limits_;
+  const std::vector<AveragedPart>& parts_;
   double time_;     // of the average
   double closest_;  // [s] knots
   double most_;     // [unit] of off_ times h^2
   double last_;     // [s] of a knot before the end
-  SmoothKnots knots_;
-  ContourPoint point_;
+  JerkLimitedKnots knots_;
+  PathPoint point_;
   std::size_t interval_ = 0;  // that contains the motion
   double begin_ = 0.0;        // of it [unit]
   double left_ = 0.0;         // [s] when the motion last left an interval or a part
@@ -209,8 +209,8 @@ class KnotMaker {
 
 }  // namespace
 
-double highestJerk(const ContourGrid& grid, std::size_t interval,
-                   const std::vector<ContourLimits>& limits, double time) {
+double highestJerk(const PathGrid& grid, std::size_t interval,
+                   const std::vector<TimingLimits>& limits, double time) {
   double highest = std::numeric_limits<double>::infinity();
   for (std::size_t j = 0; j < limits.size(); ++j) {
     const double part =
@@ -222,9 +222,9 @@ double highestJerk(const ContourGrid& grid, std::size_t interval,
   return highest;
 }
 
-SmoothKnots makeKnots(const ContourGrid& grid, const std::vector<ContourLimits>& limits,
-                      const std::vector<SmoothPart>& parts, double time, double closest,
-                      double resolution) {
+JerkLimitedKnots makeKnots(const PathGrid& grid, const std::vector<TimingLimits>& limits,
+                           const std::vector<AveragedPart>& parts, double time, double closest,
+                           double resolution) {
   return KnotMaker(grid, limits, parts, time, closest, resolution).make();
 }
 

@@ -10,9 +10,9 @@
 namespace stepdriver::motion {
 
 /// The knots of a motion between two stops, at any time.
-class SmoothKnots {
+class JerkLimitedKnots {
  public:
-  explicit SmoothKnots(std::size_t axes) : axes_(axes) {}
+  explicit JerkLimitedKnots(std::size_t axes) : axes_(axes) {}
 
   struct Knot {
     double time = 0.0;      ///< [s]
@@ -22,7 +22,7 @@ class SmoothKnots {
     std::size_t part = 0;       ///< of the smoothed motion, that ends or contains it
     double parameter = 0.0;     ///< of the segment
     double acceleration = 0.0;  ///< [unit/s^2]
-    bool even = false;          ///< see SmoothPart
+    bool even = false;          ///< see AveragedPart
   };
 
   void append(const Knot& knot, const double* position, const double* first, const double* second) {
@@ -56,8 +56,8 @@ class SmoothKnots {
 
 /// [unit/s^3] The highest s''' at which the axes keep to their jerk limits on a straight line in
 /// the directions of an interval, and build up their accelerations in `time` at the earliest.
-double highestJerk(const ContourGrid& grid, std::size_t interval,
-                   const std::vector<ContourLimits>& limits, double time);
+double highestJerk(const PathGrid& grid, std::size_t interval,
+                   const std::vector<TimingLimits>& limits, double time);
 
 /// The knots of a smoothed motion along a grid: where its jerk changes, and at the places of
 /// curves. What would be too close to the knot before it is left out: after the shortest time,
@@ -67,8 +67,8 @@ double highestJerk(const ContourGrid& grid, std::size_t interval,
 ///
 /// @param time of the average [s].
 /// @param closest no knot is nearer to the one before [s].
-SmoothKnots makeKnots(const ContourGrid& grid, const std::vector<ContourLimits>& limits,
-                      const std::vector<SmoothPart>& parts, double time, double closest,
-                      double resolution);
+JerkLimitedKnots makeKnots(const PathGrid& grid, const std::vector<TimingLimits>& limits,
+                           const std::vector<AveragedPart>& parts, double time, double closest,
+                           double resolution);
 
 }  // namespace stepdriver::motion

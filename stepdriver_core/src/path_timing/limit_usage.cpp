@@ -9,9 +9,10 @@ namespace stepdriver::motion {
 namespace {
 
 // A quintic over u from 0 to 1.
-class QuinticDemand {
+class QuinticUsage {
  public:
-  QuinticDemand(const SmoothKnots::State& begin, const SmoothKnots::State& end, double duration)
+  QuinticUsage(const JerkLimitedKnots::State& begin, const JerkLimitedKnots::State& end,
+               double duration)
       : h_(duration), v0_(begin.velocity), v1_(end.velocity), a0_(begin.acceleration) {
     const double way = end.position - begin.position;
     const double v0 = h_ * v0_;
@@ -23,19 +24,19 @@ class QuinticDemand {
     c5_ = 6.0 * way - 3.0 * v0 - 3.0 * v1 - a0 + a1;
   }
 
-  SmoothDemand of(const ContourLimits& limits) const {
+  LimitUsage of(const TimingLimits& limits) const {
     double most_jerk = std::max(std::abs(jerk(0.0)), std::abs(jerk(1.0)));
     const double level = -c4_ / (5.0 * c5_);
     if (level > 0.0 && level < 1.0) most_jerk = std::max(most_jerk, std::abs(jerk(level)));
-    SmoothDemand demand;
-    demand.jerk = std::max(demand.jerk, most_jerk / limits.jerk);
+    LimitUsage usage;
+    usage.jerk = std::max(usage.jerk, most_jerk / limits.jerk);
     // Bounds that save the search for the extremes of most quintics.
     const double above_ends =
         std::max(std::abs(a0_), std::abs(acceleration(1.0))) + h_ / 2.0 * most_jerk;
     const double faster = std::max(std::abs(v0_), std::abs(v1_)) + h_ * h_ / 8.0 * most_jerk;
     const bool accelerates = above_ends > std::min(limits.acceleration, limits.deceleration);
     const bool is_fast = faster > limits.speed;
-    if (!accelerates && !is_fast) return demand;
+    if (!accelerates && !is_fast) return usage;
     // The acceleration is monotonic from one of these to the next.
     std::array<double, 4> turns{0.0, 1.0, 1.0, 1.0};
     std::size_t count = 1;
@@ -46,13 +47,13 @@ class QuinticDemand {
     const int direction = directionOf(v0_, v1_);
     for (std::size_t i = 0; i < count && accelerates; ++i) {
       const double a = acceleration(turns[i]);
-      demand.acceleration =
-          std::max(demand.acceleration,
+      usage.acceleration =
+          std::max(usage.acceleration,
                    std::abs(a) / accelerationTowards(limits, direction, a > 0.0 ? 1 : -1));
     }
-    if (!is_fast) return demand;
+    if (!is_fast) return usage;
     const auto take_speed = [&](double u) {
-      demand.speed = std::max(demand.speed, std::abs(velocity(u)) / limits.speed);
+      usage.speed = std::max(usage.speed, std::abs(velocity(u)) / limits.speed);
     };
     take_speed(0.0);
     take_speed(1.0);
@@ -67,7 +68,7 @@ class QuinticDemand {
       }
       take_speed(low);
     }
-    return demand;
+    return usage;
   }
 
  private:
@@ -101,9 +102,9 @@ class QuinticDemand {
 
 }  // namespace
 
-SmoothDemand demandOf(const SmoothKnots::State& begin, const SmoothKnots::State& end,
-                      double duration, const ContourLimits& limits) {
-  return QuinticDemand(begin, end, duration).of(limits);
+LimitUsage usageOf(const JerkLimitedKnots::State& begin, const JerkLimitedKnots::State& end,
+                   double duration, const TimingLimits& limits) {
+  return QuinticUsage(begin, end, duration).of(limits);
 }
 
 }  // namespace stepdriver::motion

@@ -9,12 +9,12 @@
 namespace stepdriver::motion {
 
 /// The largest parts of their limits that the axes use, or 1.
-struct SmoothDemand {
+struct LimitUsage {
   double speed = 1.0;
   double acceleration = 1.0;
   double jerk = 1.0;
 
-  void include(const SmoothDemand& other) {
+  void include(const LimitUsage& other) {
     speed = std::max(speed, other.speed);
     acceleration = std::max(acceleration, other.acceleration);
     jerk = std::max(jerk, other.jerk);
@@ -25,7 +25,7 @@ struct SmoothDemand {
 };
 
 /// What the quintic between the states of two knots needs of an axis, anywhere in its duration [s].
-SmoothDemand demandOf(const SmoothKnots::State& begin, const SmoothKnots::State& end,
-                      double duration, const ContourLimits& limits);
+LimitUsage usageOf(const JerkLimitedKnots::State& begin, const JerkLimitedKnots::State& end,
+                   double duration, const TimingLimits& limits);
 
 }  // namespace stepdriver::motion

@@ -211,7 +211,8 @@ std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time
   return places;
 }
 
-std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time, bool moves) {
+std::vector<AveragedPart> movingAverage(const std::vector<SpeedPlace>& places, double time,
+                                        bool moves) {
   std::vector<double> times{moves ? -time : 0.0};
   times.reserve(places.size());
   for (std::size_t i = 1; i < places.size(); ++i) {
@@ -226,7 +227,7 @@ std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double t
   }
   MotionCursor front(places, times, 0.0);
   MotionCursor rear(places, times, time);
-  std::vector<SmoothPart> made;
+  std::vector<AveragedPart> made;
   made.reserve(2 * places.size());
   double distance = 0.0;
   for (double now = 0.0; now < kInfinity;) {
@@ -235,7 +236,7 @@ std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double t
     const MotionCursor::State ahead = front.at(now);
     const MotionCursor::State behind = rear.at(now);
     if (!made.empty()) {
-      const SmoothPart& before = made.back();
+      const AveragedPart& before = made.back();
       const double h = now - before.time;
       distance += h * (before.speed + h * (before.acceleration / 2.0 + h * before.jerk / 6.0));
     }

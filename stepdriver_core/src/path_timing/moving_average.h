@@ -42,7 +42,7 @@ struct SpeedPlace {
 std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time);
 
 /// A part of a smoothed motion, with constant jerk.
-struct SmoothPart {
+struct AveragedPart {
   double time = 0.0;          ///< [s] of its begin, as all that follows
   double distance = 0.0;      ///< [unit]
   double speed = 0.0;         ///< [unit/s]
@@ -73,7 +73,7 @@ struct SmoothPart {
 ///   time -T and is at the second one at the time 0, when its average is at the distance 0.
 /// @param time T, above 0 [s]
 /// @return the last one is at rest.
-std::vector<SmoothPart> smoothed(const std::vector<SpeedPlace>& places, double time,
-                                 bool moves = false);
+std::vector<AveragedPart> movingAverage(const std::vector<SpeedPlace>& places, double time,
+                                        bool moves = false);
 
 }  // namespace stepdriver::motion

@@ -16,10 +16,10 @@ constexpr int kMostSteps = 100;        // of the search for the largest x
 
 }  // namespace
 
-ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
-                           const std::vector<ContourLimits>& limits, double begin,
+Reachability::Reachability(const Path& path, const PathGrid& grid,
+                           const std::vector<TimingLimits>& limits, double begin,
                            CheckedAcceleration checked)
-    : contour_(contour), grid_(grid), limits_(limits) {
+    : path_(path), grid_(grid), limits_(limits) {
   // With room for all that the grid has room for.
   const auto fill = [&](auto& values, std::size_t more, auto value) {
     values.reserve(grid.capacity() + more);
@@ -39,26 +39,26 @@ ContourSpeed::ContourSpeed(const Contour& contour, const ContourGrid& grid,
   squares_.front() = begin;
 }
 
-void ContourSpeed::lower(std::size_t interval, double acceleration, double speed) {
+void Reachability::lower(std::size_t interval, double acceleration, double speed) {
   acceleration_shares_[interval] /= acceleration;
   speed_shares_[interval] /= speed;
   stale_[interval] = true;
 }
 
-void ContourSpeed::restrict(std::size_t interval, double square, double acceleration) {
+void Reachability::restrict(std::size_t interval, double square, double acceleration) {
   most_squares_[interval] = square;
   most_accelerations_[interval] = acceleration;
   stale_[interval] = true;
 }
 
-bool ContourSpeed::checkBothEnds(std::size_t interval) {
+bool Reachability::checkBothEnds(std::size_t interval) {
   if (checked_[interval] == CheckedAcceleration::kAtBothEnds) return false;
   checked_[interval] = CheckedAcceleration::kAtBothEnds;
   stale_[interval] = true;
   return true;
 }
 
-double ContourSpeed::lossOfBothEnds(std::size_t interval) {
+double Reachability::lossOfBothEnds(std::size_t interval) {
   constexpr double kRounding = 1e-9;
   const double most = controllable_[interval];
   const bool counts = checked_[interval] == CheckedAcceleration::kAtBothEnds && most > 0.0 &&
@@ -77,7 +77,7 @@ double ContourSpeed::lossOfBothEnds(std::size_t interval) {
   return higher / most;
 }
 
-void ContourSpeed::regrid(const Division& division) {
+void Reachability::regrid(const Division& division) {
   division.spread(acceleration_shares_);
   division.spread(speed_shares_);
   division.spread(most_squares_);
@@ -95,7 +95,7 @@ void ContourSpeed::regrid(const Division& division) {
   }
 }
 
-void ContourSpeed::plan() {
+void Reachability::plan() {
   const std::size_t size = grid_.size();
   if (stale_.back()) findAllowed(size - 1);
   bool changed = false;  // what is controllable at the end of the interval
@@ -122,14 +122,14 @@ void ContourSpeed::plan() {
   stale_.assign(size, false);
 }
 
-std::size_t ContourSpeed::settledUntil(std::size_t open) {
+std::size_t Reachability::settledUntil(std::size_t open) {
   constexpr double kRoundable = 0.5;  // of a segment
   double fast = capAtEnd(grid_.size() - 1);
   double slow = 0.0;
   for (std::size_t i = grid_.size(); i-- > 0;) {
-    const ContourGrid::Interval& interval = grid_[i];
+    const PathGrid::Interval& interval = grid_[i];
     fast = grid_.stopsAt(i) ? 0.0 : i >= open ? kUnbounded : largestBefore(i, fast);
-    if (interval.segment + 1 < contour_.size()) {
+    if (interval.segment + 1 < path_.size()) {
       slow = grid_.stopsAt(i) ? 0.0 : largestBefore(i, slow);
     } else if (interval.from < kRoundable && interval.straight) {
       const double before = std::min(interval.to, kRoundable) - interval.from;
@@ -143,9 +143,9 @@ std::size_t ContourSpeed::settledUntil(std::size_t open) {
   return 0;
 }
 
-double ContourSpeed::capAt(std::size_t interval, const double* first) const {
+double Reachability::capAt(std::size_t interval, const double* first) const {
   const std::size_t segment = grid_[interval].segment;
-  const std::vector<bool>& measured = contour_.measured(segment);
+  const std::vector<bool>& measured = path_.measured(segment);
   const double share = speed_shares_[interval];
   double cap = most_squares_[interval];
   double sum = 0.0;
@@ -155,17 +155,17 @@ double ContourSpeed::capAt(std::size_t interval, const double* first) const {
     const double speed = share * limits_[j].speed;
     if (square > 0.0) cap = std::min(cap, speed * speed / square);
   }
-  const double speed = contour_.speed(segment);
+  const double speed = path_.speed(segment);
   return sum > 0.0 ? std::min(cap, speed * speed / sum) : cap;
 }
 
 // The speeds on both sides of a place; before an interval.
-double ContourSpeed::capBefore(std::size_t place) const {
+double Reachability::capBefore(std::size_t place) const {
   const double after = allowed_[place].cap_at_begin;
   return place == 0 ? after : std::min(after, allowed_[place - 1].cap_at_end);
 }
 
-void ContourSpeed::findAllowed(std::size_t interval) {
+void Reachability::findAllowed(std::size_t interval) {
   Allowed& allowed = allowed_[interval];
   allowed.cap_at_begin = capAt(interval, grid_.firstAtBegin(interval));
   allowed.cap_at_end = capAt(interval, grid_.firstAtEnd(interval));
@@ -185,7 +185,7 @@ void ContourSpeed::findAllowed(std::size_t interval) {
   allowed.ramp.down = std::min(allowed.ramp.down, most_accelerations_[interval]);
 }
 
-double ContourSpeed::peakSquare(std::size_t interval) const {
+double Reachability::peakSquare(std::size_t interval) const {
   const double begin = squares_[interval];
   const double end = squares_[interval + 1];
   const Ramp& along = ramp(interval);
@@ -198,7 +198,7 @@ double ContourSpeed::peakSquare(std::size_t interval) const {
 // What the accelerations of the axes in an interval allow, with x and u at its begin: at its end x
 // is x + 2 length u = e^2. With b^2 = x, the mean of an acceleration is
 // (q1' e - q0' b) (b + e)/(2 length), and b e is (b^2 + e^2)/2 but for (e - b)^2/2.
-void ContourSpeed::collectBands(std::size_t interval, Allowed& allowed) {
+void Reachability::collectBands(std::size_t interval, Allowed& allowed) {
   allowed.most_x = kUnbounded;
   const bool mean = checked_[interval] == CheckedAcceleration::kMean;
   const double along = most_accelerations_[interval];
@@ -242,7 +242,7 @@ void ContourSpeed::collectBands(std::size_t interval, Allowed& allowed) {
 }
 
 // If x at the end of the interval is from 0 to `end`.
-ContourSpeed::Range ContourSpeed::tightestAt(std::size_t interval, double end, double x) const {
+Reachability::Range Reachability::tightestAt(std::size_t interval, double end, double x) const {
   const double twice = 2.0 * grid_[interval].length;
   Bound low{0.0, -1.0 / twice};
   Bound high{end / twice, -1.0 / twice};
@@ -272,7 +272,7 @@ ContourSpeed::Range ContourSpeed::tightestAt(std::size_t interval, double end, d
 // The largest x at the begin of an interval from which x at its end can be `end` or less. The
 // feasible (x, u) are convex and contain (0, 0): from an x that is too large, the two tightest
 // bounds of u meet at an x that is smaller, but not smaller than the solution.
-double ContourSpeed::largestBefore(std::size_t interval, double end) const {
+double Reachability::largestBefore(std::size_t interval, double end) const {
   if (grid_[interval].straight) {
     return std::min(capBefore(interval), end + 2.0 * grid_[interval].length * ramp(interval).down);
   }
@@ -287,7 +287,7 @@ double ContourSpeed::largestBefore(std::size_t interval, double end) const {
   return x;
 }
 
-double ContourSpeed::largestAfter(std::size_t interval, double begin, double end) const {
+double Reachability::largestAfter(std::size_t interval, double begin, double end) const {
   const double twice = 2.0 * grid_[interval].length;
   if (grid_[interval].straight) return std::min(end, begin + twice * ramp(interval).up);
   double most = end / twice + (-1.0 / twice) * begin;  // of u

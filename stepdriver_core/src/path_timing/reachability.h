@@ -19,14 +19,14 @@ enum class CheckedAcceleration {
   kAtBothEnds,  ///< with a constant s''
 };
 
-/// The square of the highest speed along a contour at each place of its grid, see planContour().
-class ContourSpeed {
+/// The square of the highest speed along a path at each place of its grid, see
+/// planAccelerationLimited().
+class Reachability {
  public:
-  /// @param contour, grid, limits outlive this.
+  /// @param path, grid, limits outlive this.
   /// @param begin [unit^2/s^2] the square of the speed at the begin.
-  ContourSpeed(const Contour& contour, const ContourGrid& grid,
-               const std::vector<ContourLimits>& limits, double begin = 0.0,
-               CheckedAcceleration checked = CheckedAcceleration::kAtBothEnds);
+  Reachability(const Path& path, const PathGrid& grid, const std::vector<TimingLimits>& limits,
+               double begin = 0.0, CheckedAcceleration checked = CheckedAcceleration::kAtBothEnds);
 
   /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
   /// these.
@@ -41,7 +41,7 @@ class ContourSpeed {
   /// By what factor the square of the speed before an interval would be higher if only the mean of
   /// its accelerations counted; 1 if it is lower anyway. Call it after plan().
   double lossOfBothEnds(std::size_t interval);
-  /// After ContourGrid::divideEach().
+  /// After PathGrid::divideEach().
   void regrid(const Division& division);
   /// Plans everything the first time, then only what has changed since.
   void plan();
@@ -60,7 +60,7 @@ class ContourSpeed {
   double square(std::size_t place) const { return squares_[place]; }
   /// [unit^2/s^2] The highest from which the motion can still slow down for everything ahead.
   double controllable(std::size_t place) const { return controllable_[place]; }
-  /// A place up to which the plan stays the same if the contour continues at its end, whether it
+  /// A place up to which the plan stays the same if the path continues at its end, whether it
   /// needn't slow down there or must be at rest half a segment before it, at the first place at
   /// which the rounding of a corner may begin. Call it after plan().
   ///
@@ -113,9 +113,9 @@ class ContourSpeed {
   double largestBefore(std::size_t interval, double end) const;
   double largestAfter(std::size_t interval, double begin, double end) const;
 
-  const Contour& contour_;
-  const ContourGrid& grid_;
-  const std::vector<ContourLimits>& limits_;
+  const Path& path_;
+  const PathGrid& grid_;
+  const std::vector<TimingLimits>& limits_;
   std::vector<double> acceleration_shares_;  // of each interval
   std::vector<double> speed_shares_;
   std::vector<double> most_squares_;
@@ -137,7 +137,7 @@ inline int directionOf(double begin, double end) {
 }
 
 /// The highest acceleration towards plus or minus of an axis that moves in this direction.
-inline double accelerationTowards(const ContourLimits& limits, int direction, int sign) {
+inline double accelerationTowards(const TimingLimits& limits, int direction, int sign) {
   if (direction == 0) return std::min(limits.acceleration, limits.deceleration);
   return direction == sign ? limits.acceleration : limits.deceleration;
 }

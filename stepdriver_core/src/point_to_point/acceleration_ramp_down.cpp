@@ -15,7 +15,7 @@ constexpr double kJerkRounding = 1e-9;
 
 // The lowest jerk that takes the acceleration back before the speed falls to the start speed or
 // rises to its maximum: a speed changes by a^2/(2 j) meanwhile.
-double jerkToLevelOff(const MotionState& from, const MotionLimits& limits) {
+double jerkToRampDown(const MotionState& from, const MotionLimits& limits) {
   const double speed = std::abs(from.velocity);
   const bool slows_down = from.velocity * from.acceleration < 0.0;
   if (slows_down && speed <= limits.start_speed) return 0.0;  // it can stop at once
@@ -26,12 +26,12 @@ double jerkToLevelOff(const MotionState& from, const MotionLimits& limits) {
 
 }  // namespace
 
-LevelOff::LevelOff(std::int64_t start_ns, const MotionState& from, const MotionLimits& limits,
-                   double most_jerk)
+AccelerationRampDown::AccelerationRampDown(std::int64_t start_ns, const MotionState& from,
+                                           const MotionLimits& limits, double most_jerk)
     : start_ns_(start_ns), end_(from), end_ns_(start_ns) {
   if (from.acceleration == 0.0 || limits.jerk == 0.0) return;
   const double most = most_jerk > 0.0 ? most_jerk : std::numeric_limits<double>::infinity();
-  const double jerk = std::min(jerkToLevelOff(from, limits), most);
+  const double jerk = std::min(jerkToRampDown(from, limits), most);
   if (jerk <= limits.jerk * (1.0 + kJerkRounding)) return;
   const double size = std::abs(from.acceleration);
   const auto duration_ns = static_cast<std::int64_t>(size / jerk * 1e9);
@@ -53,7 +53,7 @@ LevelOff::LevelOff(std::int64_t start_ns, const MotionState& from, const MotionL
   end_.acceleration = 0.0;
 }
 
-Plan LevelOff::followedBy(Plan rest) const {
+Plan AccelerationRampDown::followedBy(Plan rest) const {
   if (!isNeeded()) return rest;
   std::vector<Piece> pieces = pieces_;
   for (const Piece& piece : rest.profile.pieces()) pieces.push_back(piece);

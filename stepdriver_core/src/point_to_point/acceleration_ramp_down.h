@@ -13,11 +13,11 @@ namespace stepdriver::motion {
 /// before: from its acceleration, the lower jerk may take the speed past standstill, or beyond its
 /// maximum. Then the acceleration is first taken back to 0, with the jerk that this needs; at once
 /// if that would take less than a nanosecond.
-class LevelOff {
+class AccelerationRampDown {
  public:
   /// @param most_jerk [microsteps/s^3] of the motion before; 0: it had no limit.
-  LevelOff(std::int64_t start_ns, const MotionState& from, const MotionLimits& limits,
-           double most_jerk);
+  AccelerationRampDown(std::int64_t start_ns, const MotionState& from, const MotionLimits& limits,
+                       double most_jerk);
 
   bool isNeeded() const { return !pieces_.empty(); }
   /// The state from which to plan the rest, and its time. As given if it isn't needed.

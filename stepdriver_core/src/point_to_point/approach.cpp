@@ -16,7 +16,7 @@ constexpr double kSure = 1e-8;    // relative; below this the sign of a rough va
 constexpr double kLimitRounding = 1e-12;  // the relative rounding of an acceleration limit
 
 DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& limits) {
-  Reach<DoubleDouble> stop(v, a);
+  EndState<DoubleDouble> stop(v, a);
   comeToRest(stop, limits);
   return stop.length();
 }
@@ -61,28 +61,29 @@ struct Switch {
   DoubleDouble time;  // s from the beginning of the phase
 };
 
-std::optional<Switch> switchWithJerk(const Path& path, DoubleDouble length, double missing_before,
-                                     double sign, const MotionLimits& limits) {
+std::optional<Switch> switchWithJerk(const Phases& phases, DoubleDouble length,
+                                     double missing_before, double sign,
+                                     const MotionLimits& limits) {
   DoubleDouble left = length;  // the distance that is left at the beginning of a phase
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    const Phase& phase = path[i];
+  for (std::size_t i = 0; i < phases.size(); ++i) {
+    const Phase& phase = phases[i];
     // How much of the distance is missing if the motion leaves the phase at a time and stops as
     // fast as possible: it falls with the time.
     const auto rough = [&](double t) {
       const Advance<double> end = advance(phase.v.hi, phase.a.hi, phase.j, t);
       const RoughStop stop = roughStop(end.v, end.a, phase.j, limits);
-      return Value{sign * (left.hi - end.way - stop.length), -sign * stop.farther};
+      return Value{sign * (left.hi - end.displacement - stop.length), -sign * stop.farther};
     };
     const auto exact = [&](DoubleDouble t) {
       const Advance<DoubleDouble> end = advance(phase.v, phase.a, phase.j, t);
-      return (left - end.way - stoppingLength(end.v, end.a, limits)) * sign;
+      return (left - end.displacement - stoppingLength(end.v, end.a, limits)) * sign;
     };
-    const bool last = i + 1 == path.size();
-    const DoubleDouble v = last ? path.v() : path[i + 1].v;
-    const DoubleDouble a = last ? path.a() : path[i + 1].a;
+    const bool last = i + 1 == phases.size();
+    const DoubleDouble v = last ? phases.v() : phases[i + 1].v;
+    const DoubleDouble a = last ? phases.a() : phases[i + 1].a;
     const RoughStop stop = roughStop(v.hi, a.hi, phase.j, limits);
-    const DoubleDouble left_after = left - phase.way;
-    const double scale = std::max(std::abs(left.hi), std::abs(phase.way.hi));
+    const DoubleDouble left_after = left - phase.displacement;
+    const double scale = std::max(std::abs(left.hi), std::abs(phase.displacement.hi));
     double missing = sign * (left_after.hi - stop.length);
     if (!stop.applies || !(std::abs(missing) > kSure * scale)) {
       missing = sign * (left_after - stoppingLength(v, a, limits)).hi;
@@ -97,15 +98,15 @@ std::optional<Switch> switchWithJerk(const Path& path, DoubleDouble length, doub
   return std::nullopt;
 }
 
-// Without a jerk limit the stop moves on only while the speed rises, which is the end of the path:
-// by w^2/(2 a) + w^2/(2 d) until the speed is w, if it begins at standstill or passes it. A rise
-// that takes no time is no phase; the path then ends with a phase that slows down, whose
+// Without a jerk limit the stop moves on only while the speed rises, which is the end of the
+// phases: by w^2/(2 a) + w^2/(2 d) until the speed is w, if it begins at standstill or passes it. A
+// rise that takes no time is no phase; the phases then end with a phase that slows down, whose
 // acceleration has the same sign.
-std::optional<Switch> switchWithoutJerk(const Path& path, DoubleDouble missing, double sign,
+std::optional<Switch> switchWithoutJerk(const Phases& phases, DoubleDouble missing, double sign,
                                         const MotionLimits& limits) {
-  if (path.size() == 0) return std::nullopt;
-  const std::size_t last = path.size() - 1;
-  const Phase& phase = path[last];
+  if (phases.size() == 0) return std::nullopt;
+  const std::size_t last = phases.size() - 1;
+  const Phase& phase = phases[last];
   const double a = limits.acceleration;
   if (sign * phase.a.hi != a) return std::nullopt;
   const DoubleDouble ratio = exactSum(a, limits.deceleration) / limits.deceleration;
@@ -117,8 +118,8 @@ std::optional<Switch> switchWithoutJerk(const Path& path, DoubleDouble missing, 
 }
 
 void finish(Approach& motion, const MotionLimits& limits) {
-  motion.first_part = motion.path.size();
-  comeToRest(motion.path, limits);
+  motion.first_part = motion.phases.size();
+  comeToRest(motion.phases, limits);
 }
 
 }  // namespace
@@ -139,26 +140,26 @@ bool Stop::meets(double distance) const {
 
 Approach approach(DoubleDouble v, DoubleDouble a, DoubleDouble length, const Stop& stop,
                   const MotionLimits& limits) {
-  Approach motion{Path(v, a)};
+  Approach motion{Phases(v, a)};
   const DoubleDouble beyond = length - stop.length();
   if (stop.meets(beyond.hi)) {
     finish(motion, limits);
     return motion;
   }
   const double sign = beyond.hi > 0.0 ? 1.0 : -1.0;
-  Path& path = motion.path;
-  changeToMaximum(path, sign, limits);
+  Phases& phases = motion.phases;
+  changeToMaximum(phases, sign, limits);
   const std::optional<Switch> leave =
-      limits.jerk > 0.0 ? switchWithJerk(path, length, std::abs(beyond.hi), sign, limits)
-                        : switchWithoutJerk(path, abs(beyond), sign, limits);
+      limits.jerk > 0.0 ? switchWithJerk(phases, length, std::abs(beyond.hi), sign, limits)
+                        : switchWithoutJerk(phases, abs(beyond), sign, limits);
   if (leave) {
-    const double jerk = path[leave->phase].j;
-    path.cut(leave->phase);
-    path.run(jerk, leave->time);
+    const double jerk = phases[leave->phase].j;
+    phases.cut(leave->phase);
+    phases.run(jerk, leave->time);
   } else {
-    const DoubleDouble left = length - path.length();
-    const DoubleDouble cruise = left - stoppingLength(path.v(), path.a(), limits);
-    path.run(0.0, cruise / path.v());
+    const DoubleDouble left = length - phases.length();
+    const DoubleDouble cruise = left - stoppingLength(phases.v(), phases.a(), limits);
+    phases.run(0.0, cruise / phases.v());
   }
   finish(motion, limits);
   return motion;

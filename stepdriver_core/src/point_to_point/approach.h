@@ -31,7 +31,7 @@ class Stop {
 /// A motion to rest, in two parts: the first begins where the motion begins, the second ends where
 /// it ends.
 struct Approach {
-  Path path;
+  Phases phases;
   std::size_t first_part = 0;  ///< number of its phases
 };
 

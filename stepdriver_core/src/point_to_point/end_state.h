@@ -8,9 +8,9 @@ namespace stepdriver::motion {
 /// A motion from a velocity and an acceleration after a time of constant jerk.
 template <typename Real>
 struct Advance {
-  Real way;  ///< [microsteps] signed
-  Real v;    ///< [microsteps/s]
-  Real a;    ///< [microsteps/s^2]
+  Real displacement;  ///< [microsteps] signed
+  Real v;             ///< [microsteps/s]
+  Real a;             ///< [microsteps/s^2]
 };
 
 /// @param t [s] @param j [microsteps/s^3]
@@ -26,18 +26,18 @@ Advance<Real> advance(Real v, Real a, double j, Real t) {
 /// The end of a sequence of phases of constant jerk: how far and how fast. A search needs no more,
 /// and takes doubles; exact ends take DoubleDouble.
 template <typename Number>
-class Reach {
+class EndState {
  public:
   using Real = Number;
 
-  Reach(Real v, Real a) : v_(v), a_(a) {}
+  EndState(Real v, Real a) : v_(v), a_(a) {}
 
   /// Continues for `duration` [s] with the jerk `j`. A phase of less than a millionth of a
-  /// nanosecond moves nothing, as in a Path.
+  /// nanosecond moves nothing, as in Phases.
   void run(double j, Real duration) {
     if (!(highOf(duration) > 0.0)) return;
     const Advance<Real> end = advance(v_, a_, j, duration);
-    if (highOf(duration) > kNoTime) length_ = length_ + end.way;
+    if (highOf(duration) > kNegligibleTime) length_ = length_ + end.displacement;
     settle(end.v, end.a);
   }
   /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded

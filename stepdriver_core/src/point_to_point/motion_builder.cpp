@@ -28,7 +28,7 @@ MotionBuilder::MotionBuilder(const MotionState& from, const MotionLimits& limits
 
 void MotionBuilder::unround(const MotionLimits& limits) {
   if (limits.jerk == 0.0) return;
-  const DoubleDouble level = levelVelocity(Reach<DoubleDouble>(v_, a_), limits);
+  const DoubleDouble level = levelVelocity(EndState<DoubleDouble>(v_, a_), limits);
   const double scale = std::max(std::abs(v_.hi), std::abs(level.hi));
   for (const double speed : {0.0, startSpeed(limits), limits.max_speed}) {
     const DoubleDouble off = DoubleDouble(std::copysign(speed, level.hi)) - level;
@@ -54,7 +54,7 @@ bool MotionBuilder::turnAt(std::int64_t target, double sign, const MotionLimits&
   // The distance of the turning point beyond the target.
   const auto beyond = [&](auto a_end) {
     using Real = decltype(a_end);
-    Reach<Real> turned(numberOf<Real>(v_), numberOf<Real>(a_));
+    EndState<Real> turned(numberOf<Real>(v_), numberOf<Real>(a_));
     turn(turned, sign, a_end, limits);
     return Real(-sign) * (turned.length() - numberOf<Real>(end - position_));
   };
@@ -71,24 +71,24 @@ bool MotionBuilder::turnAt(std::int64_t target, double sign, const MotionLimits&
     const Bracket bracket{0.0, (range.hardest - range.softest).hi, most, least};
     a_end = range.softest + rootOf(from_softest, from_softest, bracket, noise);
   }
-  Path path(v_, a_);
-  turn(path, sign, a_end, limits);
-  add({path, path.size()}, end);
+  Phases phases(v_, a_);
+  turn(phases, sign, a_end, limits);
+  add({phases, phases.size()}, end);
   return true;
 }
 
 void MotionBuilder::moveOn(double sign, const MotionLimits& limits) {
   unround(limits);
-  Path path(v_, a_);
-  changeToMaximum(path, sign, limits);
-  path.run(0.0, std::min(kForever, kFarthestJog / limits.max_speed));
-  add({path, path.size()}, position_ + path.length());
+  Phases phases(v_, a_);
+  changeToMaximum(phases, sign, limits);
+  phases.run(0.0, std::min(kForever, kFarthestJog / limits.max_speed));
+  add({phases, phases.size()}, position_ + phases.length());
 }
 
 double MotionBuilder::heading(const MotionLimits& limits) const {
   const bool turns_at_rest = startSpeed(limits) > 0.0;
   const double level =
-      turns_at_rest ? v_.hi : levelVelocity(Reach<DoubleDouble>(v_, a_), limits).hi;
+      turns_at_rest ? v_.hi : levelVelocity(EndState<DoubleDouble>(v_, a_), limits).hi;
   return level < 0.0 || (level == 0.0 && v_.hi < 0.0) ? -1.0 : 1.0;
 }
 
@@ -101,22 +101,23 @@ std::int64_t MotionBuilder::nextRest(const MotionLimits& limits) const {
 }
 
 void MotionBuilder::add(const Approach& part, DoubleDouble end) {
-  const Path& path = part.path;
-  pieces_.reserve(pieces_.size() + path.size());
+  const Phases& phases = part.phases;
+  pieces_.reserve(pieces_.size() + phases.size());
   DoubleDouble left;  // what is left of the second part
-  for (std::size_t i = part.first_part; i < path.size(); ++i) left = left + path[i].way;
-  for (std::size_t i = 0; i < path.size(); ++i) {
+  for (std::size_t i = part.first_part; i < phases.size(); ++i)
+    left = left + phases[i].displacement;
+  for (std::size_t i = 0; i < phases.size(); ++i) {
     const bool first = i < part.first_part;
-    pieces_.push_back(pieceOf(path[i], first ? position_ : end - left));
+    pieces_.push_back(pieceOf(phases[i], first ? position_ : end - left));
     if (first) {
-      position_ = position_ + path[i].way;
+      position_ = position_ + phases[i].displacement;
     } else {
-      left = left - path[i].way;
+      left = left - phases[i].displacement;
     }
   }
   position_ = end;
-  v_ = path.v();
-  a_ = path.a();
+  v_ = phases.v();
+  a_ = phases.a();
 }
 
 Profile MotionBuilder::profile(std::int64_t start_ns) {

@@ -13,7 +13,7 @@ constexpr double kSoftest = 0.02;
 constexpr double kSpeedRounding = 1e-9;  // relative
 
 // The motion as seen from the point.
-Profile relativeMove(const MotionState& from, const MovingPoint& point, const MotionLimits& limits,
+Profile relativeMove(const MotionState& from, const MovingTarget& point, const MotionLimits& limits,
                      double highest, double softness) {
   MotionLimits seen;
   seen.max_speed = highest;
@@ -26,7 +26,7 @@ Profile relativeMove(const MotionState& from, const MovingPoint& point, const Mo
 }
 
 // The motion of a profile plus that of the point.
-std::vector<Piece> withPoint(const Profile& seen, const MovingPoint& point) {
+std::vector<Piece> withPoint(const Profile& seen, const MovingTarget& point) {
   std::vector<Piece> pieces;
   pieces.reserve(seen.pieceCount());
   DoubleDouble time;
@@ -57,8 +57,8 @@ double highestSpeed(const std::vector<Piece>& pieces) {
 
 }  // namespace
 
-std::vector<Piece> joinPoint(const MotionState& from, const MovingPoint& point,
-                             const MotionLimits& limits, double within) {
+std::vector<Piece> planIntercept(const MotionState& from, const MovingTarget& point,
+                                 const MotionLimits& limits, double within) {
   const double away = (from.position - point.position).hi;
   const double spare = limits.max_speed - std::abs(point.velocity);
   // The point leaves a motion behind it at its own speed, and comes towards one that is ahead.

@@ -8,7 +8,7 @@
 namespace stepdriver::motion {
 
 /// A point that moves at a constant velocity.
-struct MovingPoint {
+struct MovingTarget {
   DoubleDouble position;  ///< [microsteps] when the motion begins
   double velocity = 0.0;  ///< [microsteps/s]
 };
@@ -23,8 +23,8 @@ struct MovingPoint {
 /// @param within [s] If the fastest motion takes less, a lower acceleration is used, so that it
 ///   takes up to about this time: small corrections are then smooth.
 /// @return empty if the motion is there already. @pre |point.velocity| < max_speed
-std::vector<Piece> joinPoint(const MotionState& from, const MovingPoint& point,
-                             const MotionLimits& limits, double within);
+std::vector<Piece> planIntercept(const MotionState& from, const MovingTarget& point,
+                                 const MotionLimits& limits, double within);
 
 /// The state at the end of pieces. @param from if there are no pieces.
 MotionState endOf(const std::vector<Piece>& pieces, const MotionState& from);

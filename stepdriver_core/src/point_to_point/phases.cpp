@@ -18,28 +18,28 @@ Piece pieceOf(const Phase& phase, DoubleDouble position) {
   return {phase.duration, position, phase.v.hi, phase.a.hi, phase.j, phase.v.lo, phase.a.lo};
 }
 
-void Path::run(double j, DoubleDouble duration) {
+void Phases::run(double j, DoubleDouble duration) {
   if (!(duration.hi > 0.0)) return;
   const Advance<DoubleDouble> end = advance(v_, a_, j, duration);
-  if (!(duration.hi > kNoTime)) return settle(end.v, end.a);
+  if (!(duration.hi > kNegligibleTime)) return settle(end.v, end.a);
   Phase* last = size_ > 0 ? &phases_[size_ - 1] : nullptr;
   if (last != nullptr && last->j == j && same(end_v_, v_, last->v) && same(end_a_, a_, last->a)) {
     last->duration = last->duration + duration;
-    last->way = last->way + end.way;
+    last->displacement = last->displacement + end.displacement;
   } else {
-    phases_[size_++] = {duration, v_, a_, j, end.way};
+    phases_[size_++] = {duration, v_, a_, j, end.displacement};
   }
   settle(end.v, end.a);
   end_v_ = v_;
   end_a_ = a_;
 }
 
-void Path::settle(DoubleDouble v, DoubleDouble a) {
+void Phases::settle(DoubleDouble v, DoubleDouble a) {
   v_ = v;
   a_ = a;
 }
 
-void Path::cut(std::size_t count) {
+void Phases::cut(std::size_t count) {
   settle(phases_[count].v, phases_[count].a);
   size_ = count;
   if (count == 0) return;

@@ -10,20 +10,20 @@ namespace stepdriver::motion {
 
 /// A time of constant jerk, with the velocity and acceleration at its beginning.
 struct Phase {
-  DoubleDouble duration;  // s, above 0
-  DoubleDouble v;         // microsteps/s
-  DoubleDouble a;         // microsteps/s^2
-  double j = 0.0;         // microsteps/s^3
-  DoubleDouble way;       // microsteps, signed
+  DoubleDouble duration;      // s, above 0
+  DoubleDouble v;             // microsteps/s
+  DoubleDouble a;             // microsteps/s^2
+  double j = 0.0;             // microsteps/s^3
+  DoubleDouble displacement;  // microsteps, signed
 };
 
 /// A sequence of phases, built from a velocity and an acceleration: a motion whose position and
 /// start time are still unknown. Doesn't allocate.
-class Path {
+class Phases {
  public:
   using Real = DoubleDouble;
 
-  Path(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
+  Phases(DoubleDouble v, DoubleDouble a) : v_(v), a_(a) {}
 
   /// Appends a phase of jerk `j`. It is merged with the phase before it if the two are one motion.
   /// A phase of less than a millionth of a nanosecond moves nothing and is left out, but not what
@@ -38,7 +38,7 @@ class Path {
   /// [microsteps] signed
   DoubleDouble length() const {
     DoubleDouble length;
-    for (std::size_t i = 0; i < size_; ++i) length = length + phases_[i].way;
+    for (std::size_t i = 0; i < size_; ++i) length = length + phases_[i].displacement;
     return length;
   }
   DoubleDouble v() const { return v_; }

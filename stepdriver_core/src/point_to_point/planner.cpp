@@ -16,11 +16,12 @@ constexpr double kHarmless = 0.49;  // microsteps
 
 // How far a profile goes beyond its target, as seen from its beginning.
 double farthestBeyond(const Profile& profile, const MotionState& from, DoubleDouble target) {
-  const double way = (target - from.position).hi;
+  const double displacement = (target - from.position).hi;
   double farthest = 0.0;
   const auto consider = [&](DoubleDouble position) {
     const double beyond = (position - target).hi;
-    farthest = std::max(farthest, way == 0.0 ? std::abs(beyond) : std::copysign(1.0, way) * beyond);
+    farthest = std::max(farthest, displacement == 0.0 ? std::abs(beyond)
+                                                      : std::copysign(1.0, displacement) * beyond);
   };
   for (const Piece& piece : profile.pieces()) {
     consider(piece.p0);
@@ -43,7 +44,7 @@ double speedWithinMicrostep(const MotionLimits& limits) {
 // The limits of a stop: the current speed is the maximum, but at least a crawl.
 MotionLimits stopping(const MotionBuilder& motion, const MotionLimits& limits) {
   const double level =
-      std::abs(levelVelocity(Reach<DoubleDouble>(motion.v(), motion.a()), limits).value());
+      std::abs(levelVelocity(EndState<DoubleDouble>(motion.v(), motion.a()), limits).value());
   const double crawl = std::max(speedWithinMicrostep(limits), limits.start_speed);
   MotionLimits slower = limits;
   slower.max_speed = std::min(limits.max_speed, std::max(level, crawl));
@@ -79,12 +80,12 @@ Plan fastestMove(std::int64_t start_ns, const MotionState& from, std::int64_t ta
 Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t target,
               const MotionLimits& limits) {
   Plan fastest = fastestMove(start_ns, from, target, limits);
-  const double way = (fromInteger(target) - from.position).hi;
-  const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && way != 0.0;
+  const double displacement = (fromInteger(target) - from.position).hi;
+  const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && displacement != 0.0;
   if (!fastest.overshoots() || !may_turn) return fastest;
   // The fastest motion reduces its deceleration before it turns. Without that it may turn in time.
   MotionBuilder motion(from, limits);
-  if (!motion.turnAt(target, way > 0.0 ? -1.0 : 1.0, limits)) return fastest;
+  if (!motion.turnAt(target, displacement > 0.0 ? -1.0 : 1.0, limits)) return fastest;
   motion.moveTo(target, limits);
   return {motion.profile(start_ns)};
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 namespace {
 
 constexpr std::int64_t kShortestPeriod = 1'000'000;
@@ -59,4 +59,4 @@ SetpointStream::Course SetpointStream::add(double position, std::int64_t now,
   return course;
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

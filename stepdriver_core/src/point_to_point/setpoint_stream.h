@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// The position setpoints of one axis as they arrive: how far apart they come, and how fast the
 /// position changes. Times of arrival jitter, so the period and the times are smoothed.
@@ -35,4 +35,4 @@ class SetpointStream {
   std::optional<Last> last_;
 };
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

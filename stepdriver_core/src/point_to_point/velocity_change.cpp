@@ -17,18 +17,18 @@ class Mirrored {
  public:
   using Real = typename End::Real;
 
-  Mirrored(End& path, double sign) : path_(path), sign_(sign) {}
+  Mirrored(End& phases, double sign) : phases_(phases), sign_(sign) {}
 
   double sign() const { return sign_; }
-  Real v() const { return seen(path_.v()); }
-  Real a() const { return seen(path_.a()); }
-  void run(double j, Real duration) { path_.run(sign_ * j, duration); }
-  void settle(Real v, Real a) { path_.settle(seen(v), seen(a)); }
+  Real v() const { return seen(phases_.v()); }
+  Real a() const { return seen(phases_.a()); }
+  void run(double j, Real duration) { phases_.run(sign_ * j, duration); }
+  void settle(Real v, Real a) { phases_.settle(seen(v), seen(a)); }
 
  private:
   Real seen(Real value) const { return sign_ < 0.0 ? -value : value; }
 
-  End& path_;
+  End& phases_;
   double sign_;
 };
 
@@ -78,7 +78,7 @@ void level(Mirrored<End> m, double jerk) {
 }
 
 // The square of the acceleration that the fastest change may have at standstill, going from the
-// path's state (a >= 0) to `v_end` > 0: all lines of the envelope at v = 0.
+// state of the phases (a >= 0) to `v_end` > 0: all lines of the envelope at v = 0.
 template <typename End>
 typename End::Real squareAtStandstill(Mirrored<End> m, typename End::Real v_end,
                                       const MotionLimits& limits) {
@@ -107,24 +107,24 @@ bool dropToStartSpeed(Mirrored<End> m, double start, const MotionLimits& limits)
 }  // namespace
 
 template <typename End>
-typename End::Real levelVelocity(const End& path, const MotionLimits& limits) {
-  if (limits.jerk == 0.0 || highOf(path.a()) == 0.0) return path.v();
-  return path.v() + half(path.a() * abs(path.a())) / limits.jerk;
+typename End::Real levelVelocity(const End& phases, const MotionLimits& limits) {
+  if (limits.jerk == 0.0 || highOf(phases.a()) == 0.0) return phases.v();
+  return phases.v() + half(phases.a() * abs(phases.a())) / limits.jerk;
 }
 
 template <typename End>
-void changeVelocity(End& path, typename End::Real velocity, const MotionLimits& limits) {
+void changeVelocity(End& phases, typename End::Real velocity, const MotionLimits& limits) {
   using Real = typename End::Real;
-  const Real at_level = levelVelocity(path, limits);
-  const double scale = std::max(std::abs(highOf(path.v())), std::abs(highOf(at_level)));
+  const Real at_level = levelVelocity(phases, limits);
+  const double scale = std::max(std::abs(highOf(phases.v())), std::abs(highOf(at_level)));
   if (std::abs(highOf(velocity - at_level)) <= kExact<Real> * scale) {
     // The velocity is practically reached once the acceleration is 0.
-    const double a = highOf(path.a());
-    if (a != 0.0) level(Mirrored<End>(path, a > 0.0 ? -1.0 : 1.0), limits.jerk);
-    path.settle(velocity, 0.0);
+    const double a = highOf(phases.a());
+    if (a != 0.0) level(Mirrored<End>(phases, a > 0.0 ? -1.0 : 1.0), limits.jerk);
+    phases.settle(velocity, 0.0);
     return;
   }
-  Mirrored<End> m(path, at_level < velocity ? 1.0 : -1.0);
+  Mirrored<End> m(phases, at_level < velocity ? 1.0 : -1.0);
   const Real goal = velocity * m.sign();
   level(m, limits.jerk);
   if (m.v() < Real(0.0) && Real(0.0) < goal) {
@@ -136,59 +136,59 @@ void changeVelocity(End& path, typename End::Real velocity, const MotionLimits& 
 }
 
 TurnRange turnRange(DoubleDouble v, DoubleDouble a, double sign, const MotionLimits& limits) {
-  Reach<DoubleDouble> end(v, a);
-  const Mirrored<Reach<DoubleDouble>> m(end, sign);
+  EndState<DoubleDouble> end(v, a);
+  const Mirrored<EndState<DoubleDouble>> m(end, sign);
   level(m, limits.jerk);
   const DoubleDouble softest = square(m.a()) + m.v() * (2.0 * limits.jerk);
   return {sqrt(softest), sqrt(squareAtStandstill(m, DoubleDouble(limits.max_speed), limits))};
 }
 
 template <typename End>
-void turn(End& path, double sign, typename End::Real a_end, const MotionLimits& limits) {
-  const Mirrored<End> m(path, sign);
+void turn(End& phases, double sign, typename End::Real a_end, const MotionLimits& limits) {
+  const Mirrored<End> m(phases, sign);
   level(m, limits.jerk);
   rise(m, 0.0, a_end, limits.deceleration, limits.jerk);
 }
 
 template <typename End>
-void comeToRest(End& path, const MotionLimits& limits) {
+void comeToRest(End& phases, const MotionLimits& limits) {
   using Real = typename End::Real;
   const double start = startSpeed(limits);
-  if (start == 0.0) return changeVelocity(path, Real(0.0), limits);
-  if (Real(start) < abs(path.v())) {
-    const double sign = highOf(path.v()) > 0.0 ? 1.0 : -1.0;
-    if (!dropToStartSpeed(Mirrored<End>(path, sign), start, limits)) {
-      changeVelocity(path, Real(sign * start), limits);
+  if (start == 0.0) return changeVelocity(phases, Real(0.0), limits);
+  if (Real(start) < abs(phases.v())) {
+    const double sign = highOf(phases.v()) > 0.0 ? 1.0 : -1.0;
+    if (!dropToStartSpeed(Mirrored<End>(phases, sign), start, limits)) {
+      changeVelocity(phases, Real(sign * start), limits);
     }
   }
-  path.settle(0.0, 0.0);
+  phases.settle(0.0, 0.0);
 }
 
 template <typename End>
-void changeToMaximum(End& path, double sign, const MotionLimits& limits) {
+void changeToMaximum(End& phases, double sign, const MotionLimits& limits) {
   using Real = typename End::Real;
   const double start = startSpeed(limits);
   if (start > 0.0) {
-    if (!(Real(start) < abs(path.v()))) path.settle(sign * start, 0.0);
-    dropToStartSpeed(Mirrored<End>(path, sign), start, limits);
+    if (!(Real(start) < abs(phases.v()))) phases.settle(sign * start, 0.0);
+    dropToStartSpeed(Mirrored<End>(phases, sign), start, limits);
   }
-  changeVelocity(path, Real(sign * limits.max_speed), limits);
+  changeVelocity(phases, Real(sign * limits.max_speed), limits);
 }
 
 double startSpeed(const MotionLimits& limits) {
   return std::min(limits.start_speed, limits.max_speed);
 }
 
-using Search = Reach<double>;
-using Exact = Reach<DoubleDouble>;
+using Search = EndState<double>;
+using Exact = EndState<DoubleDouble>;
 
 template DoubleDouble levelVelocity(const Exact&, const MotionLimits&);
-template void changeVelocity(Path&, DoubleDouble, const MotionLimits&);
+template void changeVelocity(Phases&, DoubleDouble, const MotionLimits&);
 template void turn(Search&, double, double, const MotionLimits&);
 template void turn(Exact&, double, DoubleDouble, const MotionLimits&);
-template void turn(Path&, double, DoubleDouble, const MotionLimits&);
+template void turn(Phases&, double, DoubleDouble, const MotionLimits&);
 template void comeToRest(Exact&, const MotionLimits&);
-template void comeToRest(Path&, const MotionLimits&);
-template void changeToMaximum(Path&, double, const MotionLimits&);
+template void comeToRest(Phases&, const MotionLimits&);
+template void changeToMaximum(Phases&, double, const MotionLimits&);
 
 }  // namespace stepdriver::motion

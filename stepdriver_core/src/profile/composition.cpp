@@ -21,10 +21,10 @@ DoubleDouble accelerationOf(const Piece& piece) { return {piece.a, piece.a_rest}
 
 bool hasConstantRate(const Piece& path) { return path.a == 0.0 && path.j == 0.0; }
 
-// A part of a piece of a course, and the corresponding part of a piece of the path.
+// A part of a piece of a curve, and the corresponding part of a piece of the path.
 struct Part {
-  Piece course;
-  DoubleDouble from;  // s in the course's piece
+  Piece curve;
+  DoubleDouble from;  // s in the curve's piece
   Piece path;
   DoubleDouble begin;  // t in the path's piece
   DoubleDouble end;
@@ -37,16 +37,16 @@ struct Part {
 
 // An upper bound of the absolute value for q(s(t)).
 double largestFourthDerivative(const Part& part) {
-  const RoughPiece path(part.path);
-  const RoughPiece course(part.course);
+  const DoublePiece path(part.path);
+  const DoublePiece curve(part.curve);
   const double begin = part.begin.value();
   const double end = part.end.value();
   const double rate = path.highestSpeed(begin, end);
   const double slope = path.highestAcceleration(begin, end);
   const double acceleration =
-      course.highestAcceleration(part.from.value(), (part.from + part.length).value());
+      curve.highestAcceleration(part.from.value(), (part.from + part.length).value());
   return acceleration * (3.0 * slope * slope + 4.0 * rate * std::abs(path.j)) +
-         6.0 * std::abs(course.j) * slope * rate * rate;
+         6.0 * std::abs(curve.j) * slope * rate * rate;
 }
 
 void appendCubics(std::vector<Piece>& pieces, const Part& part) {
@@ -56,8 +56,8 @@ void appendCubics(std::vector<Piece>& pieces, const Part& part) {
   const auto state = [&](double k) {
     const DoubleDouble t = part.begin + DoubleDouble(k) * slice;
     const DoubleDouble s = part.placeAt(t);
-    return std::pair{part.course.positionAt(s),
-                     (part.course.velocityAt(s) * part.path.velocityAt(t)).value()};
+    return std::pair{part.curve.positionAt(s),
+                     (part.curve.velocityAt(s) * part.path.velocityAt(t)).value()};
   };
   auto from = state(0.0);
   for (double k = 1.0; k <= count; ++k) {
@@ -69,12 +69,12 @@ void appendCubics(std::vector<Piece>& pieces, const Part& part) {
 
 // The time at which a piece of the path has covered a distance, to a double's precision. The path
 // only goes forwards: Newton's steps, kept inside a bracket.
-double roughTimeTo(const RoughPiece& path, double way) {
+double roughTimeTo(const DoublePiece& path, double way) {
   double low = 0.0;
   double high = path.duration;
   double t = path.v0 > 0.0 ? std::min(high, way / path.v0) : high / 2.0;
   for (int i = 0; i < 100; ++i) {
-    const double error = path.way(t) - way;
+    const double error = path.displacement(t) - way;
     if (error == 0.0) return t;
     (error < 0.0 ? low : high) = t;
     double better = t - error / path.velocity(t);
@@ -89,7 +89,7 @@ double roughTimeTo(const RoughPiece& path, double way) {
 DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
   if (path.j != 0.0) {
     // Two of Newton's steps give all bits, unless the path is nearly at rest there.
-    const RoughPiece rough(path);
+    const DoublePiece rough(path);
     const double near = roughTimeTo(rough, way.value());
     if (rough.velocity(near) > 1e-3) {
       DoubleDouble t = near;
@@ -108,23 +108,24 @@ DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
   return DoubleDouble(2.0) * way / (rate + root);
 }
 
-// The motion along the course during a piece of the path whose rate changes.
-std::vector<Piece> cubicsAlong(const Profile& course, const Piece& stretch) {
+// The motion along the curve during a piece of the path whose rate changes.
+std::vector<Piece> cubicsAlong(const Profile& curve, const Piece& stretch) {
   std::vector<Piece> pieces;
   const DoubleDouble end = stretch.positionAt(stretch.duration);
-  std::size_t index = course.pieceAt(stretch.p0);
+  std::size_t index = curve.pieceAt(stretch.p0);
   DoubleDouble s = stretch.p0;
   DoubleDouble t;
-  while ((stretch.duration - t).hi > kNoTime) {
-    while (index + 1 < course.pieceCount() && !((course.pieceStart(index + 1) - s).hi > kNoTime)) {
+  while ((stretch.duration - t).hi > kNegligibleTime) {
+    while (index + 1 < curve.pieceCount() &&
+           !((curve.pieceStart(index + 1) - s).hi > kNegligibleTime)) {
       ++index;
     }
-    const DoubleDouble knot = course.pieceStart(index + 1);
-    const bool ends_here = index + 1 == course.pieceCount() || !(knot < end);
+    const DoubleDouble knot = curve.pieceStart(index + 1);
+    const bool ends_here = index + 1 == curve.pieceCount() || !(knot < end);
     const DoubleDouble next = ends_here ? end : knot;
     const DoubleDouble until = ends_here ? stretch.duration : timeTo(stretch, next - stretch.p0);
     appendCubics(pieces,
-                 {course.piece(index), s - course.pieceStart(index), stretch, t, until, next - s});
+                 {curve.piece(index), s - curve.pieceStart(index), stretch, t, until, next - s});
     s = next;
     t = until;
   }
@@ -133,10 +134,10 @@ std::vector<Piece> cubicsAlong(const Profile& course, const Piece& stretch) {
 
 // The same parts, for checking the limits.
 struct RoughPart {
-  RoughPiece course;
+  DoublePiece curve;
   double from;
   double length;
-  RoughPiece path;
+  DoublePiece path;
   double begin;
   double end;
 
@@ -152,43 +153,43 @@ struct RoughPart {
   // Uses the largest value of each factor anywhere in the part.
   bool surelyKeeps(const MotorBounds& bounds) const {
     const double to = from + length;
-    const double q1 = course.highestSpeed(from, to);
-    const double q2 = course.highestAcceleration(from, to);
+    const double q1 = curve.highestSpeed(from, to);
+    const double q2 = curve.highestAcceleration(from, to);
     const double s1 = path.highestSpeed(begin, end);
     const double s2 = path.highestAcceleration(begin, end);
     if (q2 * s1 * s1 + q1 * s2 > bounds.acceleration) return false;
     const double jerk =
-        std::abs(course.j) * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * std::abs(path.j);
+        std::abs(curve.j) * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * std::abs(path.j);
     return bounds.jerk == 0.0 || jerk <= bounds.jerk;
   }
 
   bool keepsAt(double t, const MotorBounds& bounds) const {
-    const double s = from + (path.way(t) - path.way(begin));
-    const double q1 = course.velocity(s);
-    const double q2 = course.acceleration(s);
+    const double s = from + (path.displacement(t) - path.displacement(begin));
+    const double q1 = curve.velocity(s);
+    const double q2 = curve.acceleration(s);
     const double s1 = path.velocity(t);
     const double s2 = path.acceleration(t);
     const double acceleration = q2 * s1 * s1 + q1 * s2;
-    const double jerk = course.j * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * path.j;
+    const double jerk = curve.j * s1 * s1 * s1 + 3.0 * q2 * s1 * s2 + q1 * path.j;
     return std::abs(acceleration) <= bounds.acceleration &&
            (bounds.jerk == 0.0 || std::abs(jerk) <= bounds.jerk);
   }
 };
 
-bool staysWithin(const Profile& course, const Piece& stretch, const MotorBounds& bounds) {
-  const RoughPiece path(stretch);
+bool staysWithin(const Profile& curve, const Piece& stretch, const MotorBounds& bounds) {
+  const DoublePiece path(stretch);
   const double length = (stretch.positionAt(stretch.duration) - stretch.p0).value();
   double t = 0.0;
   double way = 0.0;  // along the path, from the beginning of the stretch
-  for (std::size_t index = course.pieceAt(stretch.p0);; ++index) {
-    const bool last = index + 1 == course.pieceCount();
-    const double knot = (course.pieceStart(index + 1) - stretch.p0).value();
+  for (std::size_t index = curve.pieceAt(stretch.p0);; ++index) {
+    const bool last = index + 1 == curve.pieceCount();
+    const double knot = (curve.pieceStart(index + 1) - stretch.p0).value();
     const bool ends_here = last || !(knot < length);
-    if (!ends_here && knot - way <= kNoTime) continue;
+    if (!ends_here && knot - way <= kNegligibleTime) continue;
     const double next = ends_here ? length : knot;
     const double until = ends_here ? path.duration : roughTimeTo(path, next);
-    const double from = way + (stretch.p0 - course.pieceStart(index)).value();
-    const RoughPart part{RoughPiece(course.piece(index)), from, next - way, path, t, until};
+    const double from = way + (stretch.p0 - curve.pieceStart(index)).value();
+    const RoughPart part{DoublePiece(curve.piece(index)), from, next - way, path, t, until};
     if (!part.keeps(bounds)) return false;
     if (ends_here) return true;
     way = next;
@@ -211,27 +212,27 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale) {
   return {path.startNs(), std::move(pieces)};
 }
 
-Profile composeAlong(const std::shared_ptr<const Profile>& course, const Profile& path) {
+Profile composeAlong(const std::shared_ptr<const Profile>& curve, const Profile& path) {
   Sections sections;
   for (const Piece& stretch : path.pieces()) {
-    // A rest on the path has a duration that isn't that of any part of the course.
+    // A rest on the path has a duration that isn't that of any part of the curve.
     if (hasConstantRate(stretch) && stretch.v0 > 0.0) {
       const DoubleDouble end = stretch.positionAt(stretch.duration);
-      sections.add(Excerpt{course, stretch.p0, end, velocityOf(stretch)});
+      sections.add(Excerpt{curve, stretch.p0, end, velocityOf(stretch)});
     } else {
-      sections.add(cubicsAlong(*course, stretch));
+      sections.add(cubicsAlong(*curve, stretch));
     }
   }
   if (sections.empty()) {
     const std::int64_t s_ns = splitNanoseconds(path.endPosition()).whole;
-    return {path.startNs(), course->stateAt(course->startNs() + s_ns).position};
+    return {path.startNs(), curve->stateAt(curve->startNs() + s_ns).position};
   }
   return {path.startNs(), std::move(sections)};
 }
 
-bool staysWithin(const Profile& course, const Profile& path, const MotorBounds& bounds) {
+bool staysWithin(const Profile& curve, const Profile& path, const MotorBounds& bounds) {
   for (const Piece& stretch : path.pieces()) {
-    if (!hasConstantRate(stretch) && !staysWithin(course, stretch, bounds)) return false;
+    if (!hasConstantRate(stretch) && !staysWithin(curve, stretch, bounds)) return false;
   }
   return true;
 }

@@ -16,15 +16,15 @@ Profile scaled(const Profile& path, DoubleDouble origin, DoubleDouble scale);
 
 /// The motion of one axis on a curve q(s) while s follows `path`: q(s(t)).
 ///
-/// If s runs at a constant rate this is exact, and an excerpt of the course, which takes the same
+/// If s runs at a constant rate this is exact, and an excerpt of the curve, which takes the same
 /// time and memory however long it is. If the rate changes, s(t) is a parabola or a cubic, and
 /// q(s(t)) has a degree of up to 9. It is divided into cubics of duration h that have its position
 /// and velocity at both ends, and deviate from it by at most h^4/384 max|d^4 q/dt^4| <=
 /// kComposeError, with d^4 q/dt^4 = 6 q''' s'^2 s'' + q'' (3 s''^2 + 4 s' s''').
 ///
-/// @param course q(s), with s in seconds from its start; it moves.
-/// @param path s(t), in seconds: from 0 to the course's duration, never backwards.
-Profile composeAlong(const std::shared_ptr<const Profile>& course, const Profile& path);
+/// @param curve q(s), with s in seconds from its start; it moves.
+/// @param path s(t), in seconds: from 0 to the curve's duration, never backwards.
+Profile composeAlong(const std::shared_ptr<const Profile>& curve, const Profile& path);
 
 /// [microsteps]
 constexpr double kComposeError = 0.01;
@@ -35,10 +35,10 @@ struct MotorBounds {
   double jerk = 0.0;          ///< [microsteps/s^3] 0: no limit
 };
 
-/// Whether q(s(t)) respects the limits while the rate changes; elsewhere it is the course itself,
+/// Whether q(s(t)) respects the limits while the rate changes; elsewhere it is the curve itself,
 /// at full speed or slower. It is examined at nine points of each polynomial part, including the
 /// ends; between them it may exceed the limits by less than a hundredth. Costs nothing for the
 /// parts of the path at a constant rate.
-bool staysWithin(const Profile& course, const Profile& path, const MotorBounds& bounds);
+bool staysWithin(const Profile& curve, const Profile& path, const MotorBounds& bounds);
 
 }  // namespace stepdriver::motion

@@ -8,14 +8,14 @@
 namespace stepdriver::motion {
 
 /// A piece in doubles, which are precise enough to compare its motion with limits.
-struct RoughPiece {
+struct DoublePiece {
   double duration;  ///< [s]
   double p0;        ///< [microsteps]
   double v0;        ///< [microsteps/s]
   double a;         ///< [microsteps/s^2]
   double j;         ///< [microsteps/s^3]
 
-  explicit RoughPiece(const Piece& piece)
+  explicit DoublePiece(const Piece& piece)
       : duration(piece.duration.value()),
         p0(piece.p0.value()),
         v0(piece.v0),
@@ -24,7 +24,7 @@ struct RoughPiece {
 
   /// @name At t [s] from the beginning of the piece; the way is from p0
   /// @{
-  double way(double t) const { return t * (v0 + t * (a / 2.0 + t * (j / 6.0))); }
+  double displacement(double t) const { return t * (v0 + t * (a / 2.0 + t * (j / 6.0))); }
   double velocity(double t) const { return v0 + t * (a + t * (j / 2.0)); }
   double acceleration(double t) const { return a + t * j; }
   /// @}

@@ -4,9 +4,9 @@
 
 namespace stepdriver::motion {
 
-Extent extentOf(const Profile& profile) {
+PositionRange positionRangeOf(const Profile& profile) {
   const double end = profile.endPosition().value();
-  Extent extent{end, end};
+  PositionRange extent{end, end};
   const auto consider = [&extent](DoubleDouble position) {
     extent.lowest = std::min(extent.lowest, position.value());
     extent.highest = std::max(extent.highest, position.value());
@@ -20,7 +20,7 @@ Extent extentOf(const Profile& profile) {
   return extent;
 }
 
-double overshootOf(const Extent& extent, double from, double target) {
+double overshootOf(const PositionRange& extent, double from, double target) {
   const double above = extent.highest - target;
   const double below = target - extent.lowest;
   const double beyond = target - from > kNoStep   ? above
@@ -30,7 +30,7 @@ double overshootOf(const Extent& extent, double from, double target) {
 }
 
 double overshootOf(const Profile& profile) {
-  const Extent extent = extentOf(profile);
+  const PositionRange extent = positionRangeOf(profile);
   const double end = profile.endPosition().value();
   const double way = (profile.endPosition() - profile.startPosition()).value();
   return overshootOf(extent, end - way, end);

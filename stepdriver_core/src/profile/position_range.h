@@ -8,17 +8,17 @@ namespace stepdriver::motion {
 inline constexpr double kNoStep = 0.5;
 
 /// The lowest and the highest position of a motion [microsteps].
-struct Extent {
+struct PositionRange {
   double lowest = 0.0;
   double highest = 0.0;
 };
 
 /// Takes time in proportion to the number of pieces.
-Extent extentOf(const Profile& profile);
+PositionRange positionRangeOf(const Profile& profile);
 
 /// How far a motion from one position passes a target before it comes back to it [microsteps]; 0 if
 /// it makes no step beyond it. From less than half a microstep away, it may pass it on either side.
-double overshootOf(const Extent& extent, double from, double target);
+double overshootOf(const PositionRange& extent, double from, double target);
 
 /// How far a motion passes its own end before it comes back [microsteps]; 0 if it makes no step
 /// beyond it.

@@ -84,7 +84,7 @@ void Profile::add(std::vector<Piece> pieces) {
   for (const Piece& piece : pieces) {
     starts_.push_back(duration_);
     duration_ = duration_ + piece.duration;
-    const RoughPiece rough(piece);
+    const DoublePiece rough(piece);
     peak_speed_ = std::max(peak_speed_, rough.highestSpeed(0.0, rough.duration));
   }
   piece_count_ += pieces.size();
@@ -105,11 +105,12 @@ void Profile::add(const Excerpt& excerpt) {
   section.shift = excerpt.shift;
   // A piece that is only a rounding error is ignored.
   std::size_t first = of.pieceAt(excerpt.from);
-  if (first + 1 < of.pieceCount() && !((of.pieceStart(first + 1) - excerpt.from).hi > kNoTime)) {
+  if (first + 1 < of.pieceCount() &&
+      !((of.pieceStart(first + 1) - excerpt.from).hi > kNegligibleTime)) {
     ++first;
   }
   std::size_t last = of.pieceAt(excerpt.to);
-  if (last > first && !((excerpt.to - of.pieceStart(last)).hi > kNoTime)) --last;
+  if (last > first && !((excerpt.to - of.pieceStart(last)).hi > kNegligibleTime)) --last;
   section.of_first = first;
   section.of_last = last;
   piece_count_ += last - first + 1;

@@ -16,7 +16,7 @@ class Walk {
   explicit Walk(const Profile& profile, DoubleDouble from = {}) : profile_(profile), time_(from) {
     const std::size_t count = profile.pieces().size();
     index_ = count > 0 ? profile.pieceAt(from) : 0;
-    while (index_ < count && !(left().hi > kNoTime)) ++index_;
+    while (index_ < count && !(left().hi > kNegligibleTime)) ++index_;
   }
 
   /// How long the current polynomial lasts; empty if the motion has ended.
@@ -28,7 +28,7 @@ class Walk {
     if (!moves()) return {duration, profile_.endPosition()};
     const DoubleDouble t = time_ - profile_.pieceStart(index_);
     const Piece taken = partOf(profile_.pieces()[index_], t, duration);
-    const bool whole = !((left() - duration).hi > kNoTime);
+    const bool whole = !((left() - duration).hi > kNegligibleTime);
     time_ = whole ? profile_.pieceStart(index_ + 1) : time_ + duration;
     if (whole) ++index_;
     return taken;
@@ -58,7 +58,7 @@ Profile part(const Profile& profile, DoubleDouble from, DoubleDouble to) {
   Walk walk(profile, from);
   std::vector<Piece> pieces;
   DoubleDouble time = from;
-  while ((to - time).hi > kNoTime) {
+  while ((to - time).hi > kNegligibleTime) {
     const DoubleDouble left = to - time;
     const DoubleDouble duration = walk.moves() ? std::min(walk.left(), left) : left;
     pieces.push_back(walk.take(duration));

@@ -20,9 +20,10 @@ void takePosition(ProfilePeaks& peaks, double position, double time_s) {
 }
 
 // At a velocity of 0 inside the piece, the position has an extremum.
-void takeTurns(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
+void takeTurns(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
   const auto consider = [&](double t) {
-    if (t > 0.0 && t < piece.duration) takePosition(peaks, piece.p0 + piece.way(t), start + t);
+    if (t > 0.0 && t < piece.duration)
+      takePosition(peaks, piece.p0 + piece.displacement(t), start + t);
   };
   if (piece.j == 0.0) {
     if (piece.a != 0.0) consider(-piece.v0 / piece.a);
@@ -36,10 +37,10 @@ void takeTurns(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
   if (q != 0.0) consider(2.0 * piece.v0 / q);
 }
 
-void takePiece(ProfilePeaks& peaks, const RoughPiece& piece, double start) {
+void takePiece(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
   const double end = piece.duration;
   takePosition(peaks, piece.p0, start);
-  takePosition(peaks, piece.p0 + piece.way(end), start + end);
+  takePosition(peaks, piece.p0 + piece.displacement(end), start + end);
 
   const double last = piece.velocity(end);
   double lowest = std::min(piece.v0, last);
@@ -70,7 +71,7 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double
   double velocity = velocity_before;
   for (std::size_t index = 0; index < profile.pieces().size(); ++index) {
     giveWayAt(index);
-    const RoughPiece piece(profile.piece(index));
+    const DoublePiece piece(profile.piece(index));
     const double start = profile.pieceStart(index).value();
     takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
     takePiece(peaks, piece, start);

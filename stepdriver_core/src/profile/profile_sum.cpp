@@ -50,12 +50,12 @@ DoubleDouble ProfileSum::addPiece(Part& part, DoubleDouble from) {
   }
   const Profile& profile = *part.profile;
   const DoubleDouble at = from + part.since;
-  if (at.hi < -kNoTime) {
+  if (at.hi < -kNegligibleTime) {
     rests(profile.startPosition());
     return -part.since;
   }
   const std::size_t count = profile.pieceCount();
-  while (part.piece < count && !((profile.pieceStart(part.piece + 1) - at).hi > kNoTime)) {
+  while (part.piece < count && !((profile.pieceStart(part.piece + 1) - at).hi > kNegligibleTime)) {
     ++part.piece;
   }
   if (part.piece == count) {

@@ -38,7 +38,7 @@ PlannedMotion PlannedMotion::takenOverBy(std::shared_ptr<const Profile> plan) co
   // At rest, the time until then doesn't belong to what is still to be made.
   const DoubleDouble to = moves ? until : std::min(until, profile_->duration());
   Sections sections;
-  if ((to - from).hi > kNoTime) {
+  if ((to - from).hi > kNegligibleTime) {
     const Profile past = part(*profile_, from, to);
     std::vector<Piece> pieces;
     for (const Piece& piece : past.pieces()) pieces.push_back(piece);

@@ -155,7 +155,7 @@ class TakeUps {
 // Rests before its start too.
 void append(std::vector<Piece>& pieces, DoubleDouble& time, const Profile& taken) {
   const DoubleDouble start = secondsOf(taken.startNs());
-  if (const DoubleDouble rest = start - time; rest.hi > kNoTime) {
+  if (const DoubleDouble rest = start - time; rest.hi > kNegligibleTime) {
     pieces.push_back({rest, taken.startPosition()});
   }
   for (const Piece& piece : taken.pieces()) pieces.push_back(piece);
@@ -245,7 +245,7 @@ class MotorSections {
 
   void rest(DoubleDouble until) {
     const DoubleDouble from = time_;
-    if (!((until - from).hi > kNoTime)) return;
+    if (!((until - from).hi > kNegligibleTime)) return;
     const DoubleDouble end = std::min(until, joint_->duration());
     if (from < end) sections_.add(Excerpt{joint_, from, end, 1.0, slack_});
     const DoubleDouble left = until - std::max(from, joint_->duration());

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// A path that an axis followed with others, for those who append to it too late.
 struct EndedPath {
@@ -19,4 +19,4 @@ inline std::string howItEnded(const EndedPath* last, std::uint64_t move) {
   return "it has ended before another one, or there was none";
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

@@ -14,11 +14,11 @@ constexpr double kGentlerSlope = 0.9;
 constexpr int kSlopeTries = 20;
 
 // The steepest fall of the rate that a motor allows at a place [1/s].
-double steepestAt(const BoundCourse& course, DoubleDouble place, double rate) {
-  const MotionState state = course.curve->stateAt(splitNanoseconds(place).whole);
+double steepestAt(const LimitedCurve& curve, DoubleDouble place, double rate) {
+  const MotionState state = curve.curve->stateAt(splitNanoseconds(place).whole);
   const double speed = std::abs(state.velocity);
   const double with = std::copysign(state.acceleration, state.acceleration * state.velocity);
-  const double room = course.bounds.acceleration + with * rate * rate;
+  const double room = curve.bounds.acceleration + with * rate * rate;
   return kSteepestSlope * speed <= room ? kSteepestSlope : std::max(room, 0.0) / speed;
 }
 
@@ -37,29 +37,29 @@ struct Fall {
 };
 
 // That all motors allow in the whole slice.
-double steepestSlope(const std::vector<BoundCourse>& courses, DoubleDouble place,
+double steepestSlope(const std::vector<LimitedCurve>& curves, DoubleDouble place,
                      const Fall& fall) {
   double slope = kSteepestSlope;
   const auto limit_at = [&](DoubleDouble there, double rate_there) {
-    for (const BoundCourse& course : courses) {
-      slope = std::min(slope, steepestAt(course, there, rate_there));
+    for (const LimitedCurve& curve : curves) {
+      slope = std::min(slope, steepestAt(curve, there, rate_there));
     }
   };
   limit_at(place, fall.from.value());
   const Piece first = fall.piece(place, slope);
   limit_at(first.positionAt(first.duration), first.velocityAt(first.duration).value());
   for (int i = 0; i < kSlopeTries; ++i, slope *= kGentlerSlope) {
-    if (staysWithin(courses, fall.piece(place, slope))) return slope;
+    if (staysWithin(curves, fall.piece(place, slope))) return slope;
   }
   return 0.0;
 }
 
 }  // namespace
 
-bool staysWithin(const std::vector<BoundCourse>& courses, const Piece& piece) {
+bool staysWithin(const std::vector<LimitedCurve>& curves, const Piece& piece) {
   const Profile path(0, {piece});
-  return std::all_of(courses.begin(), courses.end(), [&](const BoundCourse& course) {
-    return staysWithin(*course.curve, path, course.bounds);
+  return std::all_of(curves.begin(), curves.end(), [&](const LimitedCurve& curve) {
+    return staysWithin(*curve.curve, path, curve.bounds);
   });
 }
 
@@ -67,15 +67,15 @@ void keepToTheEnd(std::vector<Piece>& pieces, DoubleDouble place, double rate, D
   if (rate > 0.0) pieces.push_back({(end - place) / DoubleDouble(rate), place, rate, 0.0, 0.0});
 }
 
-std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from, double rate,
-                                   const std::vector<BoundCourse>& courses, double slice,
-                                   double most, DoubleDouble end) {
+std::optional<Profile> planFeedDeceleration(std::int64_t start_ns, const MotionState& from,
+                                            double rate, const std::vector<LimitedCurve>& curves,
+                                            double slice, double most, DoubleDouble end) {
   std::vector<Piece> pieces;
   DoubleDouble place = from.position;
   Fall fall{from.velocity, rate, slice};
   for (double time = 0.0; time < most; time += slice) {
     if (!(place + fall.from * DoubleDouble(slice) < end)) return std::nullopt;
-    const double slope = steepestSlope(courses, place, fall);
+    const double slope = steepestSlope(curves, place, fall);
     const Piece& piece = pieces.emplace_back(fall.piece(place, slope));
     place = piece.positionAt(piece.duration);
     if (fall.endsWith(slope)) {

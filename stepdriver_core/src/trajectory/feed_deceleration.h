@@ -9,19 +9,19 @@
 
 namespace stepdriver::motion {
 
-/// The motion of one motor along a course, and its limits.
-struct BoundCourse {
+/// The motion of one motor along a curve, and its limits.
+struct LimitedCurve {
   std::shared_ptr<const Profile> curve;  ///< q(s), with s in seconds from its start
   MotorBounds bounds;
 };
 
 /// Whether all motors keep to their limits while the rate changes in a piece of the path.
-bool staysWithin(const std::vector<BoundCourse>& courses, const Piece& piece);
+bool staysWithin(const std::vector<LimitedCurve>& curves, const Piece& piece);
 
-/// Adds what keeps a rate from a place [s] to the end of the courses; nothing at a rate of 0.
+/// Adds what keeps a rate from a place [s] to the end of the curves; nothing at a rate of 0.
 void keepToTheEnd(std::vector<Piece>& pieces, DoubleDouble place, double rate, DoubleDouble end);
 
-/// The path s(t) along courses that comes to a lower rate as soon as their limits allow, and keeps
+/// The path s(t) along curves that comes to a lower rate as soon as their limits allow, and keeps
 /// that to the end; a rate of 0 comes to rest. At each place the rate falls as fast as the motor
 /// allows that has the least left. With |q'' s'^2 + q' s''| <= a that is s'' = -(a + q'' s'^2) / q'
 /// for q' > 0, and the same with both signs turned for q' < 0. A lower rate needs less of each
@@ -32,11 +32,11 @@ void keepToTheEnd(std::vector<Piece>& pieces, DoubleDouble place, double rate, D
 /// @param slice [s] of time. The slope is constant during each, and chosen so that all motors keep
 ///   to their limits in the whole of it, see staysWithin().
 /// @param most [s] how long it may take to the lower rate to be of use
-/// @param end [s] of the courses
-/// @return nothing if it isn't at that rate then, or only at the end of the courses.
+/// @param end [s] of the curves
+/// @return nothing if it isn't at that rate then, or only at the end of the curves.
 /// @pre a current rate above 0
-std::optional<Profile> planBraking(std::int64_t start_ns, const MotionState& from, double rate,
-                                   const std::vector<BoundCourse>& courses, double slice,
-                                   double most, DoubleDouble end);
+std::optional<Profile> planFeedDeceleration(std::int64_t start_ns, const MotionState& from,
+                                            double rate, const std::vector<LimitedCurve>& curves,
+                                            double slice, double most, DoubleDouble end);
 
 }  // namespace stepdriver::motion

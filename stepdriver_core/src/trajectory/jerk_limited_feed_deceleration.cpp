@@ -14,10 +14,9 @@ namespace {
 // Of the jerk of the rate that a motor allows if nothing else moves it, the steepest fall first.
 constexpr std::array<double, 10> kJerks = {-1.0,  -0.6, -0.35, -0.2, -0.1,
                                            -0.05, 0.0,  0.1,   0.3,  0.9};
-constexpr std::array<double, 3> kEnds = {0.9, 0.5, 0.25};          // the same, to end a slope
-constexpr double kSteepestJerk = kSteepestSlope * kSteepestSlope;  // 1/s^2
-constexpr double kNoSlope = 1e-9;                                  // 1/s
-constexpr int kMostWithoutGain = 4;                                // slices
+constexpr std::array<double, 3> kEnds = {0.9, 0.5, 0.25};  // the same, to end a slope
+constexpr double kNoSlope = 1e-9;                          // 1/s
+constexpr int kMostWithoutGain = 4;                        // slices
 
 // Where the path is, its rate, and the slope of that [1/s].
 struct RateState {
@@ -35,11 +34,11 @@ RateState endOf(const Piece& piece) {
           piece.accelerationAt(piece.duration).value()};
 }
 
-class SmoothBraking {
+class JerkLimitedFeedDeceleration {
  public:
-  SmoothBraking(double target, const std::vector<BoundCourse>& courses, double slice,
-                DoubleDouble end)
-      : courses_(courses), target_(target), slice_(slice), end_(end) {}
+  JerkLimitedFeedDeceleration(double target, const std::vector<LimitedCurve>& curves, double slice,
+                              DoubleDouble end)
+      : courses_(curves), target_(target), slice_(slice), end_(end) {}
 
   std::optional<std::vector<Piece>> plan(RateState state, double most) {
     std::vector<Piece> pieces;
@@ -107,10 +106,10 @@ class SmoothBraking {
   // [1/s^2] Of the rate.
   double highestJerk(DoubleDouble place) const {
     double highest = kSteepestJerk;
-    for (const BoundCourse& course : courses_) {
-      const MotionState state = course.curve->stateAt(splitNanoseconds(place).whole);
+    for (const LimitedCurve& curve : courses_) {
+      const MotionState state = curve.curve->stateAt(splitNanoseconds(place).whole);
       const double speed = std::abs(state.velocity);
-      const double jerk = course.bounds.jerk;
+      const double jerk = curve.bounds.jerk;
       if (jerk > 0.0 && jerk < highest * speed) highest = jerk / speed;
     }
     return highest;
@@ -120,7 +119,7 @@ class SmoothBraking {
     return piece.positionAt(piece.duration) < end_ && staysWithin(courses_, piece);
   }
 
-  const std::vector<BoundCourse>& courses_;
+  const std::vector<LimitedCurve>& courses_;
   double target_;
   double slice_;
   DoubleDouble end_;
@@ -130,12 +129,14 @@ class SmoothBraking {
 
 }  // namespace
 
-std::optional<Profile> planSmoothBraking(std::int64_t start_ns, const MotionState& from,
-                                         double rate, const std::vector<BoundCourse>& courses,
-                                         double slice, double most, DoubleDouble end) {
+std::optional<Profile> planJerkLimitedFeedDeceleration(std::int64_t start_ns,
+                                                       const MotionState& from, double rate,
+                                                       const std::vector<LimitedCurve>& curves,
+                                                       double slice, double most,
+                                                       DoubleDouble end) {
   if (from.acceleration > 0.0) return std::nullopt;
   std::optional<std::vector<Piece>> pieces =
-      SmoothBraking(rate, courses, slice, end)
+      JerkLimitedFeedDeceleration(rate, curves, slice, end)
           .plan({from.position, from.velocity, from.acceleration}, most);
   if (!pieces) return std::nullopt;
   keepToTheEnd(*pieces, endOf(pieces->back()).place, rate, end);

@@ -8,8 +8,8 @@
 
 namespace stepdriver::motion {
 
-/// The same as planBraking() if motors have jerk limits: the slope of the rate has no jump, and its
-/// jerk is constant during each slice.
+/// The same as planFeedDeceleration() if motors have jerk limits: the slope of the rate has no
+/// jump, and its jerk is constant during each slice.
 ///
 /// The slope has to end by the time at which the lower rate is reached. So in each slice the rate
 /// falls more and more steeply, as far as all motors keep to their limits, and as after it the
@@ -19,8 +19,9 @@ namespace stepdriver::motion {
 ///
 /// @param from the current position [s], rate and slope of the rate [1/s]
 /// @return nothing also if the rate is rising.
-std::optional<Profile> planSmoothBraking(std::int64_t start_ns, const MotionState& from,
-                                         double rate, const std::vector<BoundCourse>& courses,
-                                         double slice, double most, DoubleDouble end);
+std::optional<Profile> planJerkLimitedFeedDeceleration(std::int64_t start_ns,
+                                                       const MotionState& from, double rate,
+                                                       const std::vector<LimitedCurve>& curves,
+                                                       double slice, double most, DoubleDouble end);
 
 }  // namespace stepdriver::motion

@@ -17,14 +17,12 @@
 #include "profile/position_range.h"
 #include "profile/resting_count.h"
 
-namespace stepdriver::axis {
-
-using motion::DoubleDouble;
+namespace stepdriver::motion {
 
 namespace {
 
 // [s] The search for a speed tries motions that are longer, but not too long to be planned.
-constexpr double kLongestDuration = motion::Profile::kLongest / 4.0;
+constexpr double kLongestDuration = Profile::kLongest / 4.0;
 
 }  // namespace
 
@@ -48,13 +46,13 @@ double LinePath::scale(std::size_t member) const {
 }
 
 // Each axis moves in proportion to the path.
-motion::MotionLimits LinePath::tightest(motion::MotionLimits PathAxis::*limits) const {
+MotionLimits LinePath::tightest(MotionLimits PathAxis::*limits) const {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  motion::MotionLimits path{kNone, kNone, kNone, kNone, kNone};
+  MotionLimits path{kNone, kNone, kNone, kNone, kNone};
   const auto lower = [](double& limit, double other) { limit = std::min(limit, other); };
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (ways_[i].value() == 0.0) continue;
-    const motion::MotionLimits& own = axes_[i].*limits;
+    const MotionLimits& own = axes_[i].*limits;
     const double share = scale(i);
     lower(path.start_speed, own.start_speed / share);
     lower(path.max_speed, own.max_speed / share);
@@ -103,11 +101,11 @@ double LinePath::checkedSpeed(double velocity) const {
 }
 
 double LinePath::durationAt(double speed) const {
-  motion::MotionLimits limits = limits_;
+  MotionLimits limits = limits_;
   limits.max_speed = speed;
   try {
-    return motion::planMove(0, {}, length_, limits).profile.duration().value();
-  } catch (const motion::TooLong& error) {
+    return planMove(0, {}, length_, limits).profile.duration().value();
+  } catch (const TooLong& error) {
     axes_.front().refuse(error.what());
   }
 }
@@ -135,7 +133,7 @@ double LinePath::speedFor(double duration) const {
   const auto too_long = [&](DoubleDouble more) {
     return DoubleDouble(durationAt(low + more.value()) - duration);
   };
-  return std::min(highest, low + motion::rootOf(too_long, highest - low).value());
+  return std::min(highest, low + rootOf(too_long, highest - low).value());
 }
 
 bool LinePath::isOf(const std::vector<PathAxis>& axes, const std::vector<PathStart>& starts) const {
@@ -154,31 +152,28 @@ void LinePath::requireStart(const std::vector<PathStart>& starts) const {
   }
 }
 
-motion::Profile LinePath::plan(std::int64_t at, const motion::MotionState& from,
-                               double speed_override) const {
-  motion::MotionLimits limits = limits_;
+Profile LinePath::plan(std::int64_t at, const MotionState& from, double speed_override) const {
+  MotionLimits limits = limits_;
   limits.max_speed = std::min(speed_ * speed_override, limits_.max_speed);
   // The jerk of a hold may be higher.
-  const motion::LevelOff level_off(at, from, limits_, stop_limits_.jerk);
-  motion::Plan plan =
-      level_off.followedBy(motion::planMove(level_off.endNs(), level_off.end(), length_, limits));
-  if (plan.overshoot <= motion::kNoStep) return plan.profile;
+  const AccelerationRampDown ramp_down(at, from, limits_, stop_limits_.jerk);
+  Plan plan = ramp_down.followedBy(planMove(ramp_down.endNs(), ramp_down.end(), length_, limits));
+  if (plan.overshoot <= kNoStep) return plan.profile;
   // A stop may also speed up, to rest on a whole step, or leave too little room for a lower jerk.
   // What it has begun can end within its own limits.
-  motion::MotionLimits as_stop = stop_limits_;
+  MotionLimits as_stop = stop_limits_;
   as_stop.max_speed = limits.max_speed;
-  motion::Plan kept = motion::planMove(at, from, length_, as_stop);
+  Plan kept = planMove(at, from, length_, as_stop);
   return kept.overshoot < plan.overshoot ? kept.profile : plan.profile;
 }
 
-motion::Profile LinePath::planStop(std::int64_t at, const motion::MotionState& from) const {
+Profile LinePath::planStop(std::int64_t at, const MotionState& from) const {
   return motion::planStop(at, from, stop_limits_, length_);
 }
 
-motion::Profile LinePath::profileOf(std::size_t member, const motion::Profile& path) const {
-  const DoubleDouble share =
-      length_ == 0 ? DoubleDouble() : ways_[member] / motion::fromInteger(length_);
-  return motion::scaled(path, origins_[member], share);
+Profile LinePath::profileOf(std::size_t member, const Profile& path) const {
+  const DoubleDouble share = length_ == 0 ? DoubleDouble() : ways_[member] / fromInteger(length_);
+  return scaled(path, origins_[member], share);
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

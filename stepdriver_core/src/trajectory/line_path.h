@@ -7,7 +7,7 @@
 #include "point_to_point/motion_limits.h"
 #include "shared_path.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// A straight line from the positions of the axes at rest. The path's unit is about a microstep of
 /// the axis that makes the most of them.
@@ -15,7 +15,7 @@ class LinePath : public SharedPath {
  public:
   /// @param starts at rest; the backlash is taken up.
   /// @param targets [microsteps] of each joint, see PathAxis::restAt().
-  /// @param velocity along the path, see machine::LineRequest; 0: as fast as the limits allow.
+  /// @param velocity along the path, see motion::LineRequest; 0: as fast as the limits allow.
   /// @param duration [s] of the line; 0: determined by the velocity.
   /// @throw Refused if the limits of the axes don't allow that velocity, or that duration.
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
@@ -30,14 +30,13 @@ class LinePath : public SharedPath {
   /// @throw Refused if an axis isn't at rest at the beginning of the line.
   void requireStart(const std::vector<PathStart>& starts) const;
 
-  motion::MotionState begin() const override { return {}; }
-  motion::Profile plan(std::int64_t at, const motion::MotionState& from,
-                       double speed_override) const override;
-  motion::Profile planStop(std::int64_t at, const motion::MotionState& from) const override;
-  motion::Profile profileOf(std::size_t member, const motion::Profile& path) const override;
+  MotionState begin() const override { return {}; }
+  Profile plan(std::int64_t at, const MotionState& from, double speed_override) const override;
+  Profile planStop(std::int64_t at, const MotionState& from) const override;
+  Profile profileOf(std::size_t member, const Profile& path) const override;
 
  private:
-  motion::MotionLimits tightest(motion::MotionLimits PathAxis::*limits) const;
+  MotionLimits tightest(MotionLimits PathAxis::*limits) const;
   /// Linear if a linear axis moves: then the velocity of the line is that of the linear axes.
   config::Kind kindOfVelocity() const;
   double pathSpeed(double velocity) const;
@@ -47,12 +46,12 @@ class LinePath : public SharedPath {
   double scale(std::size_t member) const;
 
   std::vector<PathAxis> axes_;
-  std::vector<motion::DoubleDouble> origins_;  // microsteps of the motor
-  std::vector<motion::DoubleDouble> ways_;
-  std::int64_t length_ = 0;           // of the path: the longest distance, plus up to a microstep
-  motion::MotionLimits limits_;       // that the axes allow
-  motion::MotionLimits stop_limits_;  // the same, for stops
-  double speed_ = 0.0;                // requested speed, at a speed override of 1
+  std::vector<DoubleDouble> origins_;  // microsteps of the motor
+  std::vector<DoubleDouble> ways_;
+  std::int64_t length_ = 0;   // of the path: the longest distance, plus up to a microstep
+  MotionLimits limits_;       // that the axes allow
+  MotionLimits stop_limits_;  // the same, for stops
+  double speed_ = 0.0;        // requested speed, at a speed override of 1
 };
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

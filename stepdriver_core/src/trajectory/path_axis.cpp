@@ -8,10 +8,10 @@
 
 #include "stepdriver_core/error.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 namespace {
 
-auto tied(const motion::MotionLimits& limits) {
+auto tied(const MotionLimits& limits) {
   return std::tie(limits.start_speed, limits.max_speed, limits.acceleration, limits.deceleration,
                   limits.jerk);
 }
@@ -67,4 +67,4 @@ void PathAxis::refuseBeyondLimits(double position, const std::string& what) cons
   if (const std::string why = whyBeyondLimits(position, what); !why.empty()) refuse(why);
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

@@ -11,7 +11,7 @@
 #include "profile/resting_count.h"
 #include "stepdriver_core/config/axis_config.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// Everything that a path of several axes needs to know about one of them. It is a copy: any thread
 /// may plan a path from it, and compare it later with the state at that time.
@@ -32,10 +32,10 @@ struct PathAxis {
   double configured_backlash = 0.0;  ///< [unit]
   std::int64_t backlash = 0;         ///< [microsteps]
   /// [microsteps] For motions that begin now; the maximum speed is without the override.
-  motion::MotionLimits limits;
+  MotionLimits limits;
   config::LimitSource max_speed_source = config::LimitSource::kConfiguration;
   /// [microsteps] For every stop, as configured, regardless of `limits`.
-  motion::MotionLimits stop_limits;
+  MotionLimits stop_limits;
 
   bool operator==(const PathAxis& other) const;
   bool operator!=(const PathAxis& other) const { return !(*this == other); }
@@ -50,7 +50,7 @@ struct PathAxis {
   }
   /// [microsteps] Where a motion ends that is to bring it to a position.
   double restAt(double count) const {
-    return shares_motors ? count : static_cast<double>(motion::restingCount(count));
+    return shares_motors ? count : static_cast<double>(restingCount(count));
   }
   /// [microsteps/s^2] The larger of acceleration and deceleration.
   double mostAcceleration() const;
@@ -95,9 +95,9 @@ struct PathAxis {
 
 /// The state of an axis at the beginning of a path.
 struct PathStart {
-  motion::MotionState motor;  ///< [microsteps]
-  double slack = 0.0;         ///< [microsteps] the part of the backlash that is taken up
-  bool moves = false;         ///< false: it is at rest
+  MotionState motor;   ///< [microsteps]
+  double slack = 0.0;  ///< [microsteps] the part of the backlash that is taken up
+  bool moves = false;  ///< false: it is at rest
 };
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

@@ -13,11 +13,8 @@
 #include "profile/errors.h"
 #include "stepdriver_core/error.h"
 
-namespace stepdriver::machine {
+namespace stepdriver::motion {
 namespace {
-
-using axis::PathAxis;
-using axis::TrajectoryPoint;
 
 // The rest of the limits is left for the backlash.
 constexpr double kShareWithBacklash = 0.8;
@@ -41,17 +38,17 @@ void requireRequest(const PathRequest& request) {
 
 }  // namespace
 
-bool isSmooth(const std::vector<PathAxis>& axes) {
+bool hasJerkLimit(const std::vector<PathAxis>& axes) {
   return std::any_of(axes.begin(), axes.end(),
                      [](const PathAxis& axis) { return axis.limits.jerk > 0.0; });
 }
 
-std::vector<motion::ContourLimits> contourLimits(const std::vector<PathAxis>& axes, double share) {
-  std::vector<motion::ContourLimits> limits;
+std::vector<TimingLimits> timingLimits(const std::vector<PathAxis>& axes, double share) {
+  std::vector<TimingLimits> limits;
   limits.reserve(axes.size());
   for (const PathAxis& axis : axes) {
     const double unit = share * shareOf(axis) / axis.steps_per_unit;
-    motion::ContourLimits& limit = limits.emplace_back();
+    TimingLimits& limit = limits.emplace_back();
     limit.speed = axis.limits.max_speed * unit;
     limit.acceleration = axis.limits.acceleration * unit;
     limit.deceleration = axis.limits.deceleration * unit;
@@ -66,11 +63,11 @@ double resolutionOf(const std::vector<PathAxis>& axes) {
   return resolution;
 }
 
-void requireRange(const motion::Contour& contour, const std::vector<PathAxis>& axes,
-                  const std::vector<motion::ContourSegment>& segments) {
-  for (std::size_t i = 0; i < contour.size(); ++i) {
+void requireRange(const Path& path, const std::vector<PathAxis>& axes,
+                  const std::vector<CurveSegment>& segments) {
+  for (std::size_t i = 0; i < path.size(); ++i) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
-      const auto [low, high] = contour.range(i, k);
+      const auto [low, high] = path.range(i, k);
       const auto text = [&] { return segmentText(segments[i].number) + " at"; };
       axes[k].refuseBeyondLimits(low, text);
       axes[k].refuseBeyondLimits(high, text);
@@ -91,7 +88,7 @@ double roundingOf(double count) {
 double restTime(double way, const PathAxis& axis, double count, bool smooth) {
   constexpr double kShortest = 1e-4;      // s
   constexpr double kMostRounding = 1e-3;  // as a part of a limit
-  const motion::MotionLimits& limits = axis.limits;
+  const MotionLimits& limits = axis.limits;
   way = std::max(way, roundingOf(count) / kMostRounding);
   const double wanted = way / shareOf(axis);
   const double acceleration = std::min(limits.acceleration, limits.deceleration);
@@ -149,13 +146,13 @@ BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
   return begin;
 }
 
-std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
+std::vector<TrajectoryPoint> pointsOf(std::vector<TimingKnot> knots,
                                       const std::vector<PathAxis>& axes,
                                       const std::vector<double>& end,
-                                      const std::vector<motion::ContourSegment>& segments) {
+                                      const std::vector<CurveSegment>& segments) {
   std::vector<TrajectoryPoint> points;
   points.reserve(knots.size() + 1);
-  for (motion::ContourKnot& knot : knots) {
+  for (TimingKnot& knot : knots) {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       axes[k].refuseBeyondLimits(knot.positions[k], [&] {
         return segmentText(segments[knot.segment].number) + ", rounded at its corners, at";
@@ -174,47 +171,43 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
   return points;
 }
 
-void appendKnots(std::vector<PathWindow::Knot>& window,
-                 const std::vector<motion::ContourKnot>& knots, std::int64_t time_ns,
-                 std::size_t segment) {
+void appendKnots(std::vector<PathWindow::Knot>& window, const std::vector<TimingKnot>& knots,
+                 std::int64_t time_ns, std::size_t segment) {
   window.reserve(window.size() + knots.size());
-  for (const motion::ContourKnot& knot : knots) {
+  for (const TimingKnot& knot : knots) {
     window.push_back({time_ns + knot.time_ns, segment + knot.segment, knot.parameter, knot.speed,
                       knot.acceleration, knot.average, knot.may_begin, knot.straight});
   }
 }
 
-void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Contour& contour,
-               std::size_t first, const std::vector<std::size_t>& stops) {
+void setBlends(std::vector<CurveSegment>& segments, const Path& path, std::size_t first,
+               const std::vector<std::size_t>& stops) {
   for (std::size_t i = 0; i < segments.size(); ++i) {
     segments[i].kept = 0.0;
-    segments[i].blend = contour.blendAfter(first + i);
+    segments[i].blend = path.blendAfter(first + i);
   }
   for (const std::size_t stop : stops) segments[stop].blend = 0.0;
 }
 
 // @param segments will have the `blend` of the plan if more follows.
-motion::ContourPlan planAlong(std::vector<motion::ContourSegment>& segments,
-                              const std::vector<double>& start, const std::vector<PathAxis>& axes,
-                              bool more_follows) {
-  const bool smooth = isSmooth(axes);
-  const motion::Contour contour(
-      start, segments, resolutionOf(axes),
-      smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection, more_follows);
-  requireRange(contour, axes, segments);
-  const std::vector<motion::ContourLimits> limits =
-      contourLimits(axes, more_follows ? QueuedPath::kShareOfLimits : 1.0);
-  motion::ContourPlan plan =
-      smooth ? motion::planSmoothContour(contour, limits) : motion::planContour(contour, limits);
-  if (more_follows) setBlends(segments, contour, 0, plan.stops);
+PathTiming planAlong(std::vector<CurveSegment>& segments, const std::vector<double>& start,
+                     const std::vector<PathAxis>& axes, bool more_follows) {
+  const bool smooth = hasJerkLimit(axes);
+  const Path path(start, segments, resolutionOf(axes),
+                  smooth ? Continuity::kCurvature : Continuity::kDirection, more_follows);
+  requireRange(path, axes, segments);
+  const std::vector<TimingLimits> limits =
+      timingLimits(axes, more_follows ? QueuedPath::kShareOfLimits : 1.0);
+  PathTiming plan = smooth ? planJerkLimited(path, limits) : planAccelerationLimited(path, limits);
+  if (more_follows) setBlends(segments, path, 0, plan.stops);
   return plan;
 }
 
 // The way to rest if no segment makes a step: the axes stay at rest.
-motion::ContourPlan restAt(const std::vector<double>& place, bool smooth) {
-  motion::ContourPlan plan;
+PathTiming restAt(const std::vector<double>& place, bool smooth) {
+  PathTiming plan;
   const std::vector<double> none(place.size(), 0.0);
-  motion::ContourKnot& knot = plan.knots.emplace_back();
+  TimingKnot& knot = plan.knots.emplace_back();
   knot.positions = place;
   knot.velocities = none;
   if (smooth) knot.accelerations = none;
@@ -226,7 +219,7 @@ motion::ContourPlan restAt(const std::vector<double>& place, bool smooth) {
 PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
                   const std::vector<PathOrigin>& origins) {
   requireRequest(request);
-  const bool smooth = isSmooth(axes);
+  const bool smooth = hasJerkLimit(axes);
   PathWindow window;
   window.frame = {request.names, {}, request.velocity, request.tolerance};
   window.axes = axes;
@@ -239,13 +232,13 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
   window.segments.reserve(request.segments.size());
   for (const PathSegment& given : request.segments) reader.read(given, window.segments);
   try {
-    motion::ContourPlan planned;
+    PathTiming planned;
     if (window.segments.empty()) {
       planned = restAt(window.start, smooth);
     } else {
       planned = planAlong(window.segments, window.start, axes, request.more_follows);
     }
-    for (motion::ContourKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
+    for (TimingKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
     planned.settled_ns += begin.delay_ns;
     const std::vector<double> end = window.end();
     PathPlan plan;
@@ -265,11 +258,11 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       plan.points.insert(plan.points.begin(), std::move(first));
     }
     return plan;
-  } catch (const motion::Malformed& error) {
+  } catch (const Malformed& error) {
     throw Refused(error.what());
-  } catch (const motion::TooLong& error) {
+  } catch (const TooLong& error) {
     throw Refused(error.what());
   }
 }
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

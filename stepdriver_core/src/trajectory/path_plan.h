@@ -10,7 +10,7 @@
 #include "queued_path.h"
 #include "stepdriver_core/trajectory/requests.h"
 
-namespace stepdriver::machine {
+namespace stepdriver::motion {
 
 /// The place of an axis at rest when its path begins.
 struct PathOrigin {
@@ -22,29 +22,28 @@ struct PathOrigin {
 struct PathPlan {
   /// The first one is where the axes are at rest. The last one is on whole microsteps: if the path
   /// ends between two of them, the last piece brings the axes there. It makes no step.
-  std::vector<axis::TrajectoryPoint> points;
+  std::vector<TrajectoryPoint> points;
   std::vector<double> targets;               ///< [microsteps] the end of the path
   std::shared_ptr<const PathWindow> window;  ///< of PathRequest::more_follows
 };
 
 /// @param axes, origins one for each name of the request.
 /// @throw Refused as Machine::followPath(), except for what PreparedTrajectory finds.
-PathPlan planPath(const PathRequest& request, const std::vector<axis::PathAxis>& axes,
+PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
                   const std::vector<PathOrigin>& origins);
 
 /// @name Parts of it
 /// @{
 /// [unit] The limits on a path. @param share of the limits of the axes.
-std::vector<motion::ContourLimits> contourLimits(const std::vector<axis::PathAxis>& axes,
-                                                 double share);
+std::vector<TimingLimits> timingLimits(const std::vector<PathAxis>& axes, double share);
 /// Whether one of the axes has a jerk limit: accelerations don't jump.
-bool isSmooth(const std::vector<axis::PathAxis>& axes);
+bool hasJerkLimit(const std::vector<PathAxis>& axes);
 /// [unit] A microstep of the finest axis.
-double resolutionOf(const std::vector<axis::PathAxis>& axes);
-/// @param segments of the contour: a refusal names their numbers.
+double resolutionOf(const std::vector<PathAxis>& axes);
+/// @param segments of the path: a refusal names their numbers.
 /// @throw Refused if a segment leads beyond a soft limit.
-void requireRange(const motion::Contour& contour, const std::vector<axis::PathAxis>& axes,
-                  const std::vector<motion::ContourSegment>& segments);
+void requireRange(const Path& path, const std::vector<PathAxis>& axes,
+                  const std::vector<CurveSegment>& segments);
 
 /// From the end of a path to the microsteps at which the axes come to rest. That is half a
 /// microstep or less: no step.
@@ -53,8 +52,7 @@ struct RestOfPath {
   std::vector<double> positions;
 };
 /// @param smooth the acceleration doesn't jump.
-RestOfPath restOf(const std::vector<axis::PathAxis>& axes, const std::vector<double>& end,
-                  bool smooth);
+RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& end, bool smooth);
 
 /// The points of a trajectory along a path, to rest.
 ///
@@ -62,19 +60,18 @@ RestOfPath restOf(const std::vector<axis::PathAxis>& axes, const std::vector<dou
 ///   decide between two microsteps if the end is in their middle.
 /// @param segments of the knots: a refusal names their numbers.
 /// @throw Refused if a rounded corner leads beyond a soft limit.
-std::vector<axis::TrajectoryPoint> pointsOf(std::vector<motion::ContourKnot> knots,
-                                            const std::vector<axis::PathAxis>& axes,
-                                            const std::vector<double>& end,
-                                            const std::vector<motion::ContourSegment>& segments);
+std::vector<TrajectoryPoint> pointsOf(std::vector<TimingKnot> knots,
+                                      const std::vector<PathAxis>& axes,
+                                      const std::vector<double>& end,
+                                      const std::vector<CurveSegment>& segments);
 
 /// Sets how far the corners of segments are rounded. @param first the number of the first of them
-///   in the contour. @param stops the segments at whose end the motion stops instead.
-void setBlends(std::vector<motion::ContourSegment>& segments, const motion::Contour& contour,
-               std::size_t first, const std::vector<std::size_t>& stops);
+///   in the path. @param stops the segments at whose end the motion stops instead.
+void setBlends(std::vector<CurveSegment>& segments, const Path& path, std::size_t first,
+               const std::vector<std::size_t>& stops);
 /// @param time_ns, segment are added to those of the knots.
-void appendKnots(std::vector<PathWindow::Knot>& window,
-                 const std::vector<motion::ContourKnot>& knots, std::int64_t time_ns,
-                 std::size_t segment);
+void appendKnots(std::vector<PathWindow::Knot>& window, const std::vector<TimingKnot>& knots,
+                 std::int64_t time_ns, std::size_t segment);
 /// @}
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

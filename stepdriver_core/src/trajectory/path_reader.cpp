@@ -9,10 +9,8 @@
 #include "message_text.h"
 #include "stepdriver_core/error.h"
 
-namespace stepdriver::machine {
+namespace stepdriver::motion {
 
-using axis::PathAxis;
-using motion::ContourSegment;
 using Shape = PathSegment::Shape;
 
 namespace {
@@ -29,8 +27,8 @@ constexpr double kFullTurn = 2.0 * 3.14159265358979323846;  // rad
 
 std::string segmentText(std::size_t index) { return fmt::format("segment {} of the path", index); }
 
-void PathReader::read(const PathSegment& given, std::vector<ContourSegment>& segments) {
-  ContourSegment segment = segmentOf(given);
+void PathReader::read(const PathSegment& given, std::vector<CurveSegment>& segments) {
+  CurveSegment segment = segmentOf(given);
   ++index_;
   if (!leadsNowhere(given, segment)) {
     before_ = segment.end;
@@ -40,8 +38,8 @@ void PathReader::read(const PathSegment& given, std::vector<ContourSegment>& seg
   }
 }
 
-ContourSegment PathReader::segmentOf(const PathSegment& given) const {
-  ContourSegment segment;
+CurveSegment PathReader::segmentOf(const PathSegment& given) const {
+  CurveSegment segment;
   segment.number = index_;
   segment.end = positions(given.end, "positions");
   switch (given.shape) {
@@ -52,7 +50,7 @@ ContourSegment PathReader::segmentOf(const PathSegment& given) const {
       readArc(given, segment);
       break;
     case Shape::kBezier:
-      segment.shape = ContourSegment::Shape::kBezier;
+      segment.shape = CurveSegment::Shape::kBezier;
       segment.control1 = positions(given.control1, "numbers in control1");
       segment.control2 = positions(given.control2, "numbers in control2");
       break;
@@ -92,8 +90,8 @@ void PathReader::requirePositive(const char* what, double value) const {
                      numberText(value)));
 }
 
-void PathReader::readArc(const PathSegment& given, ContourSegment& segment) const {
-  segment.shape = ContourSegment::Shape::kArc;
+void PathReader::readArc(const PathSegment& given, CurveSegment& segment) const {
+  segment.shape = CurveSegment::Shape::kArc;
   std::array<double, 2> from{};
   std::array<double, 2> point{};
   std::array<double, 2> to{};
@@ -117,8 +115,7 @@ void PathReader::readArc(const PathSegment& given, ContourSegment& segment) cons
   }
   const bool around = given.shape == Shape::kArcAround;
   if (around) requireCircle(axes_[a], from, point, to);
-  motion::Arc arc = around ? motion::arcAround(from, point, to, given.clockwise)
-                           : motion::arcThrough(from, point, to);
+  Arc arc = around ? arcAround(from, point, to, given.clockwise) : arcThrough(from, point, to);
   const double turned = std::abs(arc.angle) * std::hypot(from[0] - point[0], from[1] - point[1]);
   // Its ends are in the same direction, but not equally far from the centre.
   if (around && turned * axes_[a].steps_per_unit < kSameEnds) {
@@ -165,8 +162,8 @@ bool PathReader::areSame(const std::array<std::size_t, 2>& plane, const std::arr
   return true;
 }
 
-bool PathReader::leadsNowhere(const PathSegment& given, const ContourSegment& segment) const {
-  if (segment.shape == ContourSegment::Shape::kArc) return false;
+bool PathReader::leadsNowhere(const PathSegment& given, const CurveSegment& segment) const {
+  if (segment.shape == CurveSegment::Shape::kArc) return false;
   double longest = 0.0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const auto take = [&](double position) {
@@ -181,7 +178,7 @@ bool PathReader::leadsNowhere(const PathSegment& given, const ContourSegment& se
   return longest < kShortestSegment;
 }
 
-void PathReader::readSpeed(const PathSegment& given, ContourSegment& segment) const {
+void PathReader::readSpeed(const PathSegment& given, CurveSegment& segment) const {
   requirePositive("velocity", given.velocity);
   const double velocity = given.velocity > 0.0 ? given.velocity : frame_.velocity;
   if (velocity == 0.0) return;
@@ -207,17 +204,17 @@ void PathReader::requireRate(double velocity, double finest, const char* unit) c
                   numberText(config::kLowestRate)));
 }
 
-bool PathReader::moves(const ContourSegment& segment, std::size_t axis) const {
+bool PathReader::moves(const CurveSegment& segment, std::size_t axis) const {
   if (segment.end[axis] != before_[axis]) return true;
   switch (segment.shape) {
-    case ContourSegment::Shape::kLine:
+    case CurveSegment::Shape::kLine:
       return false;
-    case ContourSegment::Shape::kArc:
+    case CurveSegment::Shape::kArc:
       return segment.plane[0] == axis || segment.plane[1] == axis;
-    case ContourSegment::Shape::kBezier:
+    case CurveSegment::Shape::kBezier:
       return segment.control1[axis] != before_[axis] || segment.control2[axis] != before_[axis];
   }
   return false;
 }
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

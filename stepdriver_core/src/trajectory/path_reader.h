@@ -9,7 +9,7 @@
 #include "path_axis.h"
 #include "stepdriver_core/trajectory/requests.h"
 
-namespace stepdriver::machine {
+namespace stepdriver::motion {
 
 /// What all segments of a path have in common.
 struct PathFrame {
@@ -23,36 +23,35 @@ struct PathFrame {
 class PathReader {
  public:
   /// @param frame, axes outlive this. @param from [unit] where the first segment begins.
-  PathReader(const PathFrame& frame, const std::vector<axis::PathAxis>& axes,
-             std::vector<double> from)
+  PathReader(const PathFrame& frame, const std::vector<PathAxis>& axes, std::vector<double> from)
       : frame_(frame), axes_(axes), before_(std::move(from)) {}
 
   /// Appends a segment to those of its path, unless it makes no step because it leads nowhere: then
   /// the corner before it is rounded by no more than its own tolerance.
   ///
   /// @throw Refused naming the segment, by the number of those that were read before it.
-  void read(const PathSegment& given, std::vector<motion::ContourSegment>& segments);
+  void read(const PathSegment& given, std::vector<CurveSegment>& segments);
 
  private:
   [[noreturn]] void refuse(const std::string& why) const;
   std::vector<double> positions(const std::vector<double>& given, const char* what) const;
   double place(std::size_t axis, double given, const char* what) const;
   void requirePositive(const char* what, double value) const;
-  motion::ContourSegment segmentOf(const PathSegment& given) const;
-  void readArc(const PathSegment& given, motion::ContourSegment& segment) const;
+  CurveSegment segmentOf(const PathSegment& given) const;
+  void readArc(const PathSegment& given, CurveSegment& segment) const;
   std::size_t axisOf(const std::string& name) const;
-  void requireCircle(const axis::PathAxis& axis, const std::array<double, 2>& from,
+  void requireCircle(const PathAxis& axis, const std::array<double, 2>& from,
                      const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
   bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
                const std::array<double, 2>& to) const;
-  bool leadsNowhere(const PathSegment& given, const motion::ContourSegment& segment) const;
+  bool leadsNowhere(const PathSegment& given, const CurveSegment& segment) const;
   void requireRate(double velocity, double finest, const char* unit) const;
-  void readSpeed(const PathSegment& given, motion::ContourSegment& segment) const;
+  void readSpeed(const PathSegment& given, CurveSegment& segment) const;
   bool isLinear(std::size_t axis) const { return axes_[axis].kind == config::Kind::kLinear; }
-  bool moves(const motion::ContourSegment& segment, std::size_t axis) const;
+  bool moves(const CurveSegment& segment, std::size_t axis) const;
 
   const PathFrame& frame_;
-  const std::vector<axis::PathAxis>& axes_;
+  const std::vector<PathAxis>& axes_;
   std::vector<double> before_;  // [unit] the end of the segment before
   std::size_t index_ = 0;
 };
@@ -60,4 +59,4 @@ class PathReader {
 /// "segment 3 of the path"
 std::string segmentText(std::size_t index);
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

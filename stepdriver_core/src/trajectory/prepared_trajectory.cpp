@@ -20,13 +20,8 @@
 #include "profile/resting_count.h"
 #include "spline_checks.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 namespace {
-
-using motion::DoubleDouble;
-using motion::Peak;
-using motion::Profile;
-using motion::ProfilePeaks;
 
 // The slowed trajectory may use the limits that the trajectory itself reaches.
 constexpr double kMore = 1.0 + kTrajectoryTolerance;
@@ -75,7 +70,7 @@ void requirePositions(const PathAxis& axis, const ProfilePeaks& joint, double be
   }
 }
 
-void requireSmooth(const PathAxis& axis, const motion::SplineJerk& jerk, double begin,
+void requireSmooth(const PathAxis& axis, const SplineJerk& jerk, double begin,
                    const Remedy& remedy) {
   if (axis.limits.jerk == 0.0) return;
   const Peak& jump = jerk.acceleration_jump;
@@ -107,7 +102,7 @@ double shareOfJoint(const PathAxis& axis) {
 
 // The smallest factor on the times of a curve that keeps it within the limits; 1 if it does so
 // already. A factor k divides velocities by k, accelerations by k^2 and jerks by k^3.
-double slowdownOf(const PathAxis& axis, const ProfilePeaks& peaks, const motion::SplineJerk& jerk) {
+double slowdownOf(const PathAxis& axis, const ProfilePeaks& peaks, const SplineJerk& jerk) {
   double factor = 1.0;
   const auto take = [&](const Peak& peak, double most, double order) {
     const double excess = std::abs(peak.value) / (most * shareOfJoint(axis));
@@ -132,9 +127,9 @@ std::string remedyText(double shortest, double wanted) {
 }
 
 // At rest, a first point at time 0 gives the position that the trajectory assumes for the axis.
-void requireStart(const PathAxis& axis, const motion::Waypoint& first, const PathStart& start) {
+void requireStart(const PathAxis& axis, const Waypoint& first, const PathStart& start) {
   const double count =
-      static_cast<double>(motion::restingCount(start.motor.position.value())) - start.slack;
+      static_cast<double>(restingCount(start.motor.position.value())) - start.slack;
   if (std::abs(first.position - count) <= axis.microsteps) return;
   axis.refuse(fmt::format(
       "the trajectory begins at {}, but the axis stands at {}; they may differ by one full step",
@@ -154,22 +149,22 @@ double finiteOf(const PathAxis& axis, std::size_t member, std::size_t point,
 
 double jerkOf(const Profile& profile) {
   double jerk = 0.0;
-  for (const motion::Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
+  for (const Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
   return jerk;
 }
 
-void widen(motion::MotorBounds& bounds, const PathAxis& axis, const ProfilePeaks& peaks,
+void widen(MotorBounds& bounds, const PathAxis& axis, const ProfilePeaks& peaks,
            const Profile& profile) {
   bounds.acceleration = std::max(bounds.acceleration, std::abs(peaks.acceleration.value));
   if (axis.limits.jerk > 0.0) bounds.jerk = std::max(bounds.jerk, jerkOf(profile));
 }
 
-motion::MotionState jointOf(const PathStart& start) {
+MotionState jointOf(const PathStart& start) {
   return {start.motor.position - start.slack, start.motor.velocity, start.motor.acceleration};
 }
 
 double endVelocity(const Profile& profile) {
-  const motion::Piece last = profile.pieces().back();
+  const Piece last = profile.pieces().back();
   return last.velocityAt(last.duration).value();
 }
 
@@ -177,8 +172,7 @@ double endVelocity(const Profile& profile) {
 
 PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        const std::vector<TrajectoryPoint>& points,
-                                       const std::vector<motion::MotionState>& expected,
-                                       bool allow_slower)
+                                       const std::vector<MotionState>& expected, bool allow_slower)
     : axes_(std::move(axes)), allow_slower_(allow_slower) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   requirePoints(points);
@@ -228,13 +222,12 @@ std::optional<double> PreparedTrajectory::slowdownFor(Source source) const {
     double more = 1.0;
     for (std::size_t member = 0; member < axes_.size(); ++member) {
       const PathAxis& axis = axes_[member];
-      const motion::MotionState& from = source.expected[member];
-      const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
+      const MotionState& from = source.expected[member];
+      const std::vector<Waypoint> waypoints = waypointsOf(member, source);
       try {
-        const Profile curve = motion::planSpline(0, from, waypoints, curveLimits(member));
-        more = std::max(more, slowdownOf(axis, motion::profilePeaks(curve),
-                                         motion::splineJerk(from, waypoints)));
-      } catch (const motion::Malformed& error) {
+        const Profile curve = planSpline(0, from, waypoints, curveLimits(member));
+        more = std::max(more, slowdownOf(axis, profilePeaks(curve), splineJerk(from, waypoints)));
+      } catch (const Malformed& error) {
         axis.refuse(error.what());
       }
     }
@@ -273,17 +266,17 @@ void PreparedTrajectory::requirePoints(const std::vector<TrajectoryPoint>& point
   }
 }
 
-std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
-                                                              const Source& source) const {
+std::vector<Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
+                                                      const Source& source) const {
   const PathAxis& axis = axes_[member];
-  std::vector<motion::Waypoint> waypoints(source.points.size());
+  std::vector<Waypoint> waypoints(source.points.size());
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     giveWayAt(i);
     const TrajectoryPoint& point = source.points[i];
     const auto take = [&](const std::vector<double>& numbers, const char* what) {
       return finiteOf(axis, member, i, numbers, what);
     };
-    motion::Waypoint& waypoint = waypoints[i];
+    Waypoint& waypoint = waypoints[i];
     waypoint.time_ns = nanoseconds(source.slowdown * point.time);
     const double position = take(point.positions, "positions");
     axis.refuseBeyondLimits(position, [&] { return pointText(i) + " at"; });
@@ -299,24 +292,23 @@ std::vector<motion::Waypoint> PreparedTrajectory::waypointsOf(std::size_t member
   }
   waypoints.back().may_rest = axis.shares_motors;
   try {
-    motion::requireWaypoints(waypoints);
-  } catch (const motion::Malformed& error) {
+    requireWaypoints(waypoints);
+  } catch (const Malformed& error) {
     axis.refuse(error.what());
   }
-  return motion::interpolate(
-      source.expected[member], std::move(waypoints),
-      axis.limits.jerk > 0.0 ? motion::Smoothness::kJerk : motion::Smoothness::kAcceleration);
+  return interpolate(source.expected[member], std::move(waypoints),
+                     axis.limits.jerk > 0.0 ? Smoothness::kJerk : Smoothness::kAcceleration);
 }
 
-motion::MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {
-  motion::MotionLimits limits = axes_[member].limits;
+MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {
+  MotionLimits limits = axes_[member].limits;
   limits.acceleration = axes_[member].mostAcceleration();
   return limits;
 }
 
-motion::SplineLimits PreparedTrajectory::curveLimits(std::size_t member) const {
+SplineLimits PreparedTrajectory::curveLimits(std::size_t member) const {
   const PathAxis& axis = axes_[member];
-  motion::SplineLimits limits{axis.mostAcceleration(), axis.limits.max_speed};
+  SplineLimits limits{axis.mostAcceleration(), axis.limits.max_speed};
   if (has_velocities_ && axis.limits.jerk == 0.0) limits.gentler_beyond = kMore;
   return limits;
 }
@@ -330,21 +322,21 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
     slower.slowdown = slowdownFor(source).value_or(1.0);
     return slower.slowdown > 1.0 ? remedyText(slower.duration(), source.duration()) : std::string();
   };
-  const std::vector<motion::Waypoint> waypoints = waypointsOf(member, source);
+  const std::vector<Waypoint> waypoints = waypointsOf(member, source);
   Part part;
   part.ends = {waypoints.front(), waypoints.back()};
   part.target = axis.countOf(source.points.back().positions[member]);
   part.begins_at_start = waypoints.size() > 1 && waypoints.front().time_ns == 0;
   part.bounds = {axis.mostAcceleration() * kMore, axis.limits.jerk * kMore};
   try {
-    part.spline = std::make_unique<const motion::SplineTail>(waypoints, curveLimits(member));
-  } catch (const motion::Malformed& error) {
+    part.spline = std::make_unique<const SplineTail>(waypoints, curveLimits(member));
+  } catch (const Malformed& error) {
     axis.refuse(error.what());
   }
   const Profile* joint = part.spline->profile();
   if (joint == nullptr) return part;
   const double begin = part.spline->beginS();
-  const ProfilePeaks joint_peaks = motion::profilePeaks(*joint, joint->piece(0).v0);
+  const ProfilePeaks joint_peaks = profilePeaks(*joint, joint->piece(0).v0);
   requirePositions(axis, joint_peaks, begin);
   requireSmooth(axis, part.spline->jerk(), begin, remedy);
   if (axis.backlash == 0) {
@@ -352,53 +344,52 @@ PreparedTrajectory::Part PreparedTrajectory::prepare(std::size_t member,
     widen(part.bounds, axis, joint_peaks, *joint);
     return part;
   }
-  part.motor =
-      std::make_unique<const motion::MotorTail>(*joint, axis.backlash, motorLimits(member));
+  part.motor = std::make_unique<const MotorTail>(*joint, axis.backlash, motorLimits(member));
   if (const auto time = part.motor->noRoom()) refuseTurn(axis, begin + *time);
   const Profile& motor = part.motor->profile();
-  const ProfilePeaks peaks = motion::profilePeaks(motor, motor.piece(0).v0);
+  const ProfilePeaks peaks = profilePeaks(motor, motor.piece(0).v0);
   requireLimits(axis, peaks, begin, remedy);
   widen(part.bounds, axis, peaks, motor);
   return part;
 }
 
-motion::MotorPlan PreparedTrajectory::planWhole(std::size_t member, const Profile& joint,
-                                                double slack) const {
+MotorPlan PreparedTrajectory::planWhole(std::size_t member, const Profile& joint,
+                                        double slack) const {
   if (joint.pieceCount() > kFewPieces) {
     axes_[member].refuse(
         "the trajectory can't begin from here: it turns so often that its backlash is never "
         "taken up; let the axis come to rest before the first point");
   }
-  return motion::planMotor(joint, slack, axes_[member].backlash, motorLimits(member));
+  return planMotor(joint, slack, axes_[member].backlash, motorLimits(member));
 }
 
 PreparedTrajectory::Head PreparedTrajectory::headOf(std::size_t member,
                                                     const PathStart& start) const {
-  const motion::SplineTail& spline = *parts_[member].spline;
-  const motion::MotionState from = jointOf(start);
+  const SplineTail& spline = *parts_[member].spline;
+  const MotionState from = jointOf(start);
   try {
     return {spline.head(from), spline.headJerk(from)};
-  } catch (const motion::Malformed& error) {
+  } catch (const Malformed& error) {
     axes_[member].refuse(error.what());
   }
 }
 
-std::vector<motion::Piece> PreparedTrajectory::quickestTo(std::size_t member,
-                                                          const PathStart& start) const {
+std::vector<Piece> PreparedTrajectory::quickestTo(std::size_t member,
+                                                  const PathStart& start) const {
   const PathAxis& axis = axes_[member];
-  motion::MotionLimits limits = axis.limits;
+  MotionLimits limits = axis.limits;
   for (double* limit :
        {&limits.max_speed, &limits.acceleration, &limits.deceleration, &limits.jerk}) {
     *limit *= shareOfJoint(axis);
   }
   limits.start_speed = std::min(limits.start_speed, limits.max_speed);
-  const motion::Waypoint& point = parts_[member].ends.back();
-  const motion::MotionState from = jointOf(start);
-  std::vector<motion::Piece> pieces;
+  const Waypoint& point = parts_[member].ends.back();
+  const MotionState from = jointOf(start);
+  std::vector<Piece> pieces;
   try {
     const Profile plan = planMove(0, from, axis.restAt(point.position), limits).profile;
-    for (const motion::Piece& piece : plan.pieces()) pieces.push_back(piece);
-  } catch (const motion::TooLong& error) {
+    for (const Piece& piece : plan.pieces()) pieces.push_back(piece);
+  } catch (const TooLong& error) {
     axis.refuse(error.what());
   }
   // An axis that is there already waits for the others.
@@ -412,30 +403,30 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
   const PathAxis& axis = axes_[member];
   const Part& part = parts_[member];
   if (!start.moves && part.begins_at_start) requireStart(axis, part.ends.front(), start);
-  const std::vector<motion::Piece>& pieces = given.pieces;
+  const std::vector<Piece>& pieces = given.pieces;
   const Profile head(0, pieces);
   const DoubleDouble begin = head.duration();
   const Profile* tail = part.spline->profile();
-  requirePositions(axis, motion::profilePeaks(head), 0.0);
+  requirePositions(axis, profilePeaks(head), 0.0);
   requireSmooth(axis, given.jerk, 0.0, remedy);
 
-  motion::Sections sections;
+  Sections sections;
   sections.add(pieces);
   if (tail != nullptr) {
-    sections.add(motion::Excerpt{{own, tail}, 0.0, tail->duration()});
+    sections.add(Excerpt{{own, tail}, 0.0, tail->duration()});
   }
   const auto joint = std::make_shared<const Profile>(0, std::move(sections));
   std::shared_ptr<const Profile> motor = joint;
-  std::vector<motion::JoinedMotor::Stretch> fresh{{0.0, begin.value()}};
+  std::vector<JoinedMotor::Stretch> fresh{{0.0, begin.value()}};
   if (axis.backlash > 0) {
-    std::optional<motion::JoinedMotor> joined;
+    std::optional<JoinedMotor> joined;
     if (tail != nullptr) {
       joined = part.motor->join({own, part.motor.get()}, joint, begin, start.slack);
     }
     if (!joined) {
-      motion::MotorPlan whole = planWhole(member, *joint, start.slack);
+      MotorPlan whole = planWhole(member, *joint, start.slack);
       const double end = whole.profile.duration().value();
-      joined = motion::JoinedMotor{std::move(whole.profile), {{0.0, end}}, whole.no_room};
+      joined = JoinedMotor{std::move(whole.profile), {{0.0, end}}, whole.no_room};
     }
     if (joined->no_room) refuseTurn(axis, *joined->no_room);
     fresh = joined->fresh;
@@ -452,9 +443,9 @@ TrajectoryPath::Member PreparedTrajectory::joinMember(
     const double seam = first && tail != nullptr ? tail->piece(0).v0 - endVelocity(head) : 0.0;
     const bool to_rest = first && tail == nullptr;
     const ProfilePeaks own_peaks =
-        motion::profilePeaks(planned, first ? start.motor.velocity : planned.piece(0).v0,
-                             to_rest ? 0.0 : endVelocity(planned) + seam);
-    peaks = first ? own_peaks : motion::joinPeaks(peaks, own_peaks, stretch.from);
+        profilePeaks(planned, first ? start.motor.velocity : planned.piece(0).v0,
+                     to_rest ? 0.0 : endVelocity(planned) + seam);
+    peaks = first ? own_peaks : joinPeaks(peaks, own_peaks, stretch.from);
     widen(made.bounds, axis, own_peaks, planned);
     first = false;
   }
@@ -470,7 +461,7 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::lineTo(
     const std::vector<PathStart>& starts) const {
   std::vector<double> targets;
   for (std::size_t i = 0; i < starts.size(); ++i) {
-    const motion::Waypoint& point = parts_[i].ends.back();
+    const Waypoint& point = parts_[i].ends.back();
     const double joint = axes_[i].restAt(point.position);
     const double slack = starts[i].slack;
     const double way = joint + slack - starts[i].motor.position.value();
@@ -497,7 +488,7 @@ double PreparedTrajectory::wantedDuration() const {
 
 bool PreparedTrajectory::isOneRest() const {
   return std::all_of(parts_.begin(), parts_.end(), [](const Part& part) {
-    const motion::Waypoint& point = part.ends.back();
+    const Waypoint& point = part.ends.back();
     return part.spline->profile() == nullptr && point.velocity.value_or(0.0) == 0.0 &&
            point.acceleration.value_or(0.0) == 0.0;
   });
@@ -519,7 +510,7 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::joinAll(
   double slowdown = 1.0;
   for (std::size_t i = 0; i < starts.size(); ++i) {
     heads.push_back(headOf(i, starts[i]));
-    const ProfilePeaks peaks = motion::profilePeaks(Profile(0, heads[i].pieces));
+    const ProfilePeaks peaks = profilePeaks(Profile(0, heads[i].pieces));
     slowdown = std::max(slowdown, slowdownOf(axes_[i], peaks, heads[i].jerk));
   }
   double shortest = 0.0;  // unknown
@@ -546,4 +537,4 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::joinAll(
   return std::make_shared<const TrajectoryPath>(std::move(members));
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

@@ -16,7 +16,7 @@
 #include "stepdriver_core/trajectory/requests.h"
 #include "trajectory_path.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// A trajectory that is planned and checked except for its first segment, which depends on the
 /// positions of the axes when it begins. Preparing it takes time in proportion to its points, in
@@ -39,7 +39,7 @@ class PreparedTrajectory {
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
   ///   first segment.
   PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points,
-                     const std::vector<motion::MotionState>& expected, bool allow_slower = false);
+                     const std::vector<MotionState>& expected, bool allow_slower = false);
   PreparedTrajectory(const PreparedTrajectory&) = delete;
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
@@ -64,26 +64,26 @@ class PreparedTrajectory {
  private:
   // Everything that is known about one axis in advance. A motor tail points into the spline tail.
   struct Part {
-    std::vector<motion::Waypoint> ends;  // the first waypoint, and the last
-    double target = 0.0;                 // [microsteps] the last position as it was commanded
-    bool begins_at_start = false;        // the first of several points is at time 0
-    std::unique_ptr<const motion::SplineTail> spline;
-    std::unique_ptr<const motion::MotorTail> motor;  // only with a backlash
-    motion::MotorBounds bounds;                      // reached by the tail
+    std::vector<Waypoint> ends;    // the first waypoint, and the last
+    double target = 0.0;           // [microsteps] the last position as it was commanded
+    bool begins_at_start = false;  // the first of several points is at time 0
+    std::unique_ptr<const SplineTail> spline;
+    std::unique_ptr<const MotorTail> motor;  // only with a backlash
+    MotorBounds bounds;                      // reached by the tail
   };
 
   // What a trajectory is made from.
   struct Source {
     const std::vector<TrajectoryPoint>& points;
-    const std::vector<motion::MotionState>& expected;
+    const std::vector<MotionState>& expected;
     double slowdown = 1.0;  // the factor on the times
 
     double duration() const { return slowdown * points.back().time; }
   };
   // The way to the first point.
   struct Head {
-    std::vector<motion::Piece> pieces;
-    motion::SplineJerk jerk;
+    std::vector<Piece> pieces;
+    SplineJerk jerk;
   };
 
   std::shared_ptr<const SharedPath> lineTo(const std::vector<PathStart>& starts) const;
@@ -97,19 +97,19 @@ class PreparedTrajectory {
   void requirePoints(const std::vector<TrajectoryPoint>& points) const;
   /// Whether the velocities and accelerations of a single point aren't used.
   bool onlyPositionsCount(const std::vector<TrajectoryPoint>& points) const;
-  std::vector<motion::Waypoint> waypointsOf(std::size_t member, const Source& source) const;
+  std::vector<Waypoint> waypointsOf(std::size_t member, const Source& source) const;
   double wantedDuration() const;  // [s]
   Head headOf(std::size_t member, const PathStart& start) const;
   /// The fastest motion to rest at the last point.
-  std::vector<motion::Piece> quickestTo(std::size_t member, const PathStart& start) const;
+  std::vector<Piece> quickestTo(std::size_t member, const PathStart& start) const;
   /// Whether it has a single segment, which ends at rest.
   bool isOneRest() const;
   TrajectoryPath::Member joinMember(const std::shared_ptr<const PreparedTrajectory>& own,
                                     std::size_t member, const PathStart& start, const Head& given,
                                     const std::function<std::string()>& remedy) const;
-  motion::MotorPlan planWhole(std::size_t member, const motion::Profile& joint, double slack) const;
-  motion::MotionLimits motorLimits(std::size_t member) const;
-  motion::SplineLimits curveLimits(std::size_t member) const;
+  MotorPlan planWhole(std::size_t member, const Profile& joint, double slack) const;
+  MotionLimits motorLimits(std::size_t member) const;
+  SplineLimits curveLimits(std::size_t member) const;
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
@@ -118,4 +118,4 @@ class PreparedTrajectory {
   bool allow_slower_ = false;
 };
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

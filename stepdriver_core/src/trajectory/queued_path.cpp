@@ -17,29 +17,21 @@
 #include "spline.h"
 #include "stepdriver_core/error.h"
 
-namespace stepdriver::machine {
-
-using axis::PathAxis;
-using axis::PathStart;
-using axis::TrajectoryPath;
-using axis::TrajectoryPoint;
-using motion::ContourSegment;
-using motion::DoubleDouble;
-using motion::Profile;
+namespace stepdriver::motion {
 
 namespace {
 
 // Of the excess of a plan from a speed.
-constexpr double kNoExcess = 1e-9;
+constexpr double kNoExcessFromSpeed = 1e-9;
 // Of the maximum speed: the backlash is at rest. With a jerk limit it comes to rest gently, and
 // must not have an acceleration.
 constexpr double kStill = 1e-3;
 constexpr double kStillGently = 1e-6;
 // [microsteps] A backlash at rest is so close to whole microsteps.
-constexpr double kNear = 1e-3;
+constexpr double kNearMicrostep = 1e-3;
 // If the axes can't slow down before a corner, its rounding begins later: the part of the segment
 // that is left for it is halved so often, and then it isn't rounded.
-constexpr int kHalvings = 6;
+constexpr int kCornerHalvings = 6;
 // [ns] Straight lines aren't divided closer to their end.
 constexpr std::int64_t kShortestPart = 100'000;
 // Starts that are tried before the end of the path.
@@ -47,13 +39,13 @@ constexpr int kMostStarts = 8;
 // Segments before and after a corner into which it may be rounded.
 constexpr std::size_t kMostRounded = 33;
 
-void appendPieces(std::vector<motion::Piece>& pieces, const Profile& profile) {
-  for (const motion::Piece& piece : profile.pieces()) pieces.push_back(piece);
+void appendPieces(std::vector<Piece>& pieces, const Profile& profile) {
+  for (const Piece& piece : profile.pieces()) pieces.push_back(piece);
 }
 
 double largestJerk(const Profile& profile) {
   double jerk = 0.0;
-  for (const motion::Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
+  for (const Piece& piece : profile.pieces()) jerk = std::max(jerk, std::abs(piece.j));
   return jerk;
 }
 
@@ -64,9 +56,9 @@ double lengthBetween(const std::vector<double>& from, const std::vector<double>&
 }
 
 // The derivative at the end of a segment.
-double endRate(const std::vector<double>& from, const ContourSegment& segment) {
-  const motion::Contour alone(from, {segment}, 1.0);
-  motion::ContourPoint end;
+double endRate(const std::vector<double>& from, const CurveSegment& segment) {
+  const Path alone(from, {segment}, 1.0);
+  PathPoint end;
   alone.evaluate(0, 1.0, end);
   return lengthBetween(std::vector<double>(end.first.size(), 0.0), end.first);
 }
@@ -77,20 +69,20 @@ double endRate(const std::vector<double>& from, const ContourSegment& segment) {
 struct QueuedPath::Start {
   std::int64_t time_ns = 0;
   std::size_t segment = 0;
-  motion::ContourBegin begin;
+  TimingStart begin;
   // At rest after the end of the path: the way from the microsteps of the axes to that end takes so
-  // long, and the contour begins with the new segments.
+  // long, and the path begins with the new segments.
   std::optional<double> from_rest;
   bool on_straight = false;  // between two knots
 };
 
 struct QueuedPath::Continuation {
-  std::vector<ContourSegment> segments;  // from that of the start on
-  motion::ContourPlan plan;
+  std::vector<CurveSegment> segments;  // from that of the start on
+  PathTiming plan;
   std::vector<PathStart> states;
 };
 
-QueuedPath::QueuedPath(const std::shared_ptr<const axis::SharedPath>& motion,
+QueuedPath::QueuedPath(const std::shared_ptr<const SharedPath>& motion,
                        std::shared_ptr<const PathWindow> window, bool more_follows)
     : motion_(std::dynamic_pointer_cast<const TrajectoryPath>(motion)),
       window_(std::move(window)),
@@ -122,14 +114,14 @@ std::vector<double> QueuedPath::targets() const {
   return targets;
 }
 
-std::vector<ContourSegment> QueuedPath::read(const std::vector<PathSegment>& given) const {
+std::vector<CurveSegment> QueuedPath::read(const std::vector<PathSegment>& given) const {
   const std::vector<double>& end = window_->end();
   PathReader reader(window_->frame, window_->axes, end);
-  std::vector<ContourSegment> added;
+  std::vector<CurveSegment> added;
   added.reserve(given.size());
   for (const PathSegment& segment : given) reader.read(segment, added);
   if (!added.empty()) {
-    requireRange(motion::Contour(end, added, resolutionOf(window_->axes)), window_->axes, added);
+    requireRange(Path(end, added, resolutionOf(window_->axes)), window_->axes, added);
   }
   return added;
 }
@@ -160,7 +152,7 @@ QueuedPath::Start QueuedPath::atKnot(const PathWindow::Knot& knot) {
 
 QueuedPath::Start QueuedPath::atRest() const {
   const std::vector<double>& end = window_->end();
-  const double duration = restOf(window_->axes, end, isSmooth(window_->axes)).duration;
+  const double duration = restOf(window_->axes, end, hasJerkLimit(window_->axes)).duration;
   const auto end_ns = static_cast<std::int64_t>(std::ceil(motion_->end().value() * 1e9));
   return {end_ns, window_->segments.size(), {}, duration, false};
 }
@@ -178,7 +170,7 @@ std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t from_ns) cons
       first->time_ns - time_ns > kShortestPart) {
     starts.push_back(onStraight(static_cast<std::size_t>(first - knots.begin()) - 1, time_ns));
   }
-  if (starts.empty() && from_ns < time_ns && isSmooth(window_->axes)) {
+  if (starts.empty() && from_ns < time_ns && hasJerkLimit(window_->axes)) {
     const auto until = std::make_reverse_iterator(first);
     auto tried = knots.rend();
     for (const bool accelerates : {true, false}) {
@@ -211,7 +203,7 @@ std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t from_ns) cons
 // Empty if a backlash is being taken up there.
 std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
                                                            const JointPlace& joint) const {
-  const std::int64_t at_ns = start.time_ns - motion::splitNanoseconds(motion_->origin()).whole;
+  const std::int64_t at_ns = start.time_ns - splitNanoseconds(motion_->origin()).whole;
   std::vector<PathStart> states;
   for (std::size_t k = 0; k < window_->axes.size(); ++k) {
     const PathAxis& axis = window_->axes[k];
@@ -221,8 +213,8 @@ std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
     const double slack = state.motor.position.value() - axis.countOf(joint.position[k]);
     const double still = axis.limits.jerk > 0.0 ? kStillGently : kStill;
     const double taking_up = state.motor.velocity - joint.velocity[k] * axis.steps_per_unit;
-    state.slack = static_cast<double>(motion::restingCount(slack));
-    const bool rests = std::abs(slack - state.slack) < kNear &&
+    state.slack = static_cast<double>(restingCount(slack));
+    const bool rests = std::abs(slack - state.slack) < kNearMicrostep &&
                        std::abs(taking_up) <= still * axis.limits.max_speed;
     if (!rests) return std::nullopt;
   }
@@ -230,7 +222,7 @@ std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
 }
 
 // The plan begins exactly where the axes are.
-void QueuedPath::adjust(Start& start, const motion::ContourPoint& planned,
+void QueuedPath::adjust(Start& start, const PathPoint& planned,
                         const std::vector<PathStart>& states) const {
   double square = 0.0;
   double way = 0.0;
@@ -256,12 +248,12 @@ void QueuedPath::adjust(Start& start, const motion::ContourPoint& planned,
 
 // The first segment whose corner at the end is rounded into this one, or this one.
 std::size_t QueuedPath::firstRoundedInto(std::size_t segment) const {
-  const std::vector<ContourSegment>& segments = window_->segments;
+  const std::vector<CurveSegment>& segments = window_->segments;
   std::size_t first = segment;
   double away = 0.0;
   for (std::size_t i = segment; i-- > 0 && segment - i <= kMostRounded;) {
     if (segments[i].blend.value_or(0.0) > away) first = i;
-    if (segments[i].shape != ContourSegment::Shape::kLine) break;
+    if (segments[i].shape != CurveSegment::Shape::kLine) break;
     const std::vector<double>& from = i == 0 ? window_->start : segments[i - 1].end;
     away += lengthBetween(from, segments[i].end);
   }
@@ -270,14 +262,14 @@ std::size_t QueuedPath::firstRoundedInto(std::size_t segment) const {
 
 // The segments from this one on, with the corners that are rounded at the start or before it as
 // they are. The others may be rounded again, after the start.
-std::vector<ContourSegment> QueuedPath::aroundStart(const Start& start, std::size_t first) const {
-  const std::vector<ContourSegment>& old = window_->segments;
-  std::vector<ContourSegment> made(old.begin() + static_cast<std::ptrdiff_t>(first), old.end());
+std::vector<CurveSegment> QueuedPath::aroundStart(const Start& start, std::size_t first) const {
+  const std::vector<CurveSegment>& old = window_->segments;
+  std::vector<CurveSegment> made(old.begin() + static_cast<std::ptrdiff_t>(first), old.end());
   double away = 0.0;
   bool near = true;  // roundings may reach the start
   for (std::size_t i = start.segment; i < old.size(); ++i) {
-    ContourSegment& segment = made[i - first];
-    const bool line = segment.shape == ContourSegment::Shape::kLine;
+    CurveSegment& segment = made[i - first];
+    const bool line = segment.shape == CurveSegment::Shape::kLine;
     near = near && (line || i == start.segment) && i <= start.segment + kMostRounded;
     if (near) {
       away += (i == start.segment ? 1.0 - start.begin.parameter : 1.0) *
@@ -293,24 +285,24 @@ std::vector<ContourSegment> QueuedPath::aroundStart(const Start& start, std::siz
 
 // Empty if the axes can't follow the rest of the path from there.
 std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
-    Start start, const std::vector<ContourSegment>& added, bool more_follows,
+    Start start, const std::vector<CurveSegment>& added, bool more_follows,
     int most_halvings) const {
-  const std::vector<ContourSegment>& old = window_->segments;
+  const std::vector<CurveSegment>& old = window_->segments;
   const std::vector<PathAxis>& axes = window_->axes;
-  const bool smooth = isSmooth(axes);
-  const auto continuity = smooth ? motion::Continuity::kCurvature : motion::Continuity::kDirection;
+  const bool smooth = hasJerkLimit(axes);
+  const auto continuity = smooth ? Continuity::kCurvature : Continuity::kDirection;
   const std::size_t first = firstRoundedInto(start.segment);
   const std::size_t before = start.segment - first;  // segments before that of the start
   const std::vector<double>& from = first == 0 ? window_->start : old[first - 1].end;
-  std::vector<ContourSegment> segments = aroundStart(start, first);
+  std::vector<CurveSegment> segments = aroundStart(start, first);
   const std::size_t corner = segments.size();  // the number of the segment after it
   segments.insert(segments.end(), added.begin(), added.end());
   const double resolution = resolutionOf(axes);
-  const std::vector<motion::ContourLimits> limits = contourLimits(axes, kShareOfLimits);
+  const std::vector<TimingLimits> limits = timingLimits(axes, kShareOfLimits);
   const bool in_last = corner == before + 1;
   if (in_last) segments[before].kept = start.begin.parameter;
-  const motion::Contour given(from, segments, resolution, continuity, more_follows);
-  motion::ContourPoint place;
+  const Path given(from, segments, resolution, continuity, more_follows);
+  PathPoint place;
   given.evaluate(before, start.begin.parameter, place);
   const auto states = statesAt(start, jointAt(start, place));
   if (!states) return std::nullopt;
@@ -320,16 +312,16 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
   for (int halvings = 0; halvings <= most_halvings; ++halvings) {
     if (corner > before) {
       const double kept = in_last ? start.begin.parameter : 0.0;
-      const double left = halvings == kHalvings ? 0.0 : std::ldexp(1.0 - kept, -halvings);
+      const double left = halvings == kCornerHalvings ? 0.0 : std::ldexp(1.0 - kept, -halvings);
       segments[corner - 1].kept = 1.0 - left;
     }
-    const motion::Contour contour(from, segments, resolution, continuity, more_follows);
-    const motion::Contour rest = contour.part(before, segments.size() - 1);
-    made.plan = smooth ? motion::planSmoothContour(rest, limits, start.begin)
-                       : motion::planContour(rest, limits, start.begin);
-    if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcess) {
+    const Path path(from, segments, resolution, continuity, more_follows);
+    const Path rest = path.part(before, segments.size() - 1);
+    made.plan = smooth ? planJerkLimited(rest, limits, start.begin)
+                       : planAccelerationLimited(rest, limits, start.begin);
+    if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcessFromSpeed) {
       made.segments.assign(segments.begin() + static_cast<std::ptrdiff_t>(before), segments.end());
-      setBlends(made.segments, contour, before, made.plan.stops);
+      setBlends(made.segments, path, before, made.plan.stops);
       return made;
     }
     if (corner == before) break;
@@ -337,11 +329,10 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
   return std::nullopt;
 }
 
-QueuedPath::JointPlace QueuedPath::jointAt(const Start& start,
-                                           const motion::ContourPoint& place) const {
+QueuedPath::JointPlace QueuedPath::jointAt(const Start& start, const PathPoint& place) const {
   if (start.from_rest) {
     const std::vector<double>& end = window_->end();
-    return {restOf(window_->axes, end, isSmooth(window_->axes)).positions,
+    return {restOf(window_->axes, end, hasJerkLimit(window_->axes)).positions,
             std::vector<double>(end.size(), 0.0)};
   }
   double square = 0.0;
@@ -357,40 +348,40 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
                                                          const Continuation& continuation,
                                                          const std::vector<TrajectoryPoint>& points,
                                                          std::int64_t passed_ns) const {
-  const DoubleDouble passed = motion::secondsOf(passed_ns);
+  const DoubleDouble passed = secondsOf(passed_ns);
   std::vector<TrajectoryPath::Member> members = motion_->members();
-  const bool smooth = isSmooth(window_->axes);
+  const bool smooth = hasJerkLimit(window_->axes);
   for (std::size_t k = 0; k < members.size(); ++k) {
     const PathAxis& axis = window_->axes[k];
     const PathStart& state = continuation.states[k];
-    std::vector<motion::Waypoint> waypoints;
+    std::vector<Waypoint> waypoints;
     waypoints.reserve(points.size());
     for (const TrajectoryPoint& point : points) {
       const std::int64_t time_ns = nanoseconds(point.time);
       if (time_ns == 0) continue;  // the start
-      motion::Waypoint& waypoint = waypoints.emplace_back();
+      Waypoint& waypoint = waypoints.emplace_back();
       waypoint.time_ns = time_ns;
       waypoint.position = axis.countOf(point.positions[k]);
       waypoint.velocity = point.velocities[k] * axis.steps_per_unit;
       if (smooth) waypoint.acceleration = point.accelerations[k] * axis.steps_per_unit;
     }
     if (!waypoints.empty()) waypoints.back().may_rest = axis.shares_motors;
-    motion::MotionState joint_state{state.motor.position - state.slack, state.motor.velocity, 0.0};
+    MotionState joint_state{state.motor.position - state.slack, state.motor.velocity, 0.0};
     if (smooth) joint_state.acceleration = points.front().accelerations[k] * axis.steps_per_unit;
-    Profile motor = motion::planSpline(0, joint_state, waypoints, {axis.mostAcceleration()});
+    Profile motor = planSpline(0, joint_state, waypoints, {axis.mostAcceleration()});
     if (axis.backlash > 0) {
-      motion::MotionLimits limits = axis.limits;
+      MotionLimits limits = axis.limits;
       limits.acceleration = axis.mostAcceleration();
-      motion::MotorPlan plan = motion::planMotor(motor, state.slack, axis.backlash, limits);
+      MotorPlan plan = planMotor(motor, state.slack, axis.backlash, limits);
       if (plan.no_room) return nullptr;
       motor = std::move(plan.profile);
     }
-    std::vector<motion::Piece> pieces;
+    std::vector<Piece> pieces;
     appendPieces(pieces, motion::part(*members[k].curve, passed - motion_->origin(),
-                                      motion::secondsOf(start.time_ns) - motion_->origin()));
+                                      secondsOf(start.time_ns) - motion_->origin()));
     appendPieces(pieces, motor);
-    const motion::ProfilePeaks peaks = motion::profilePeaks(motor, state.motor.velocity);
-    for (motion::MotorBounds* bounds : {&members[k].bounds, &members[k].stop_bounds}) {
+    const ProfilePeaks peaks = profilePeaks(motor, state.motor.velocity);
+    for (MotorBounds* bounds : {&members[k].bounds, &members[k].stop_bounds}) {
       bounds->acceleration = std::max(bounds->acceleration, std::abs(peaks.acceleration.value));
       if (bounds->jerk > 0.0) bounds->jerk = std::max(bounds->jerk, largestJerk(motor));
     }
@@ -408,7 +399,7 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
   if (segments.empty()) return unchanged();
   if (!more_follows_) throw Refused("the path is complete: it was told that no more follows");
   const std::int64_t passed_ns =
-      std::max(nanoseconds(passed), motion::splitNanoseconds(motion_->origin()).whole);
+      std::max(nanoseconds(passed), splitNanoseconds(motion_->origin()).whole);
   const PathAhead ahead = aheadOf(static_cast<double>(passed_ns) * 1e-9);
   if (segments.size() > ahead.room) {
     throw Refused(fmt::format(
@@ -416,23 +407,24 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
         segments.size(), ahead.segments, ahead.room));
   }
   try {
-    const std::vector<ContourSegment> added = read(segments);
+    const std::vector<CurveSegment> added = read(segments);
     if (added.empty()) return unchanged();
     const std::int64_t changeable_ns = std::max(nanoseconds(changeable), passed_ns);
     const std::vector<Start> starts = startsFrom(changeable_ns);
     // With a jerk limit, a later start is better than a corner that is rounded less.
-    for (const int halvings : {isSmooth(window_->axes) ? 0 : kHalvings, kHalvings}) {
+    for (const int halvings :
+         {hasJerkLimit(window_->axes) ? 0 : kCornerHalvings, kCornerHalvings}) {
       for (const Start& start : starts) {
-        if (start.begin.speed == 0.0 && halvings < kHalvings) break;
+        if (start.begin.speed == 0.0 && halvings < kCornerHalvings) break;
         std::optional<Continuation> found = continueFrom(start, added, more_follows, halvings);
         if (!found) continue;
         Longer longer = continued(start, *std::move(found), added, more_follows, passed_ns);
         if (longer.path) return longer;
       }
     }
-  } catch (const motion::Malformed& error) {
+  } catch (const Malformed& error) {
     throw Refused(error.what());
-  } catch (const motion::TooLong& error) {
+  } catch (const TooLong& error) {
     throw Refused(error.what());
   }
   throw Refused(
@@ -441,12 +433,12 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
 }
 
 QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation continuation,
-                                         const std::vector<ContourSegment>& added,
-                                         bool more_follows, std::int64_t passed_ns) const {
+                                         const std::vector<CurveSegment>& added, bool more_follows,
+                                         std::int64_t passed_ns) const {
   const double delay = start.from_rest.value_or(0.0);
   if (delay > 0.0) {
     const auto delay_ns = static_cast<std::int64_t>(std::ceil(delay * 1e9));
-    for (motion::ContourKnot& knot : continuation.plan.knots) knot.time_ns += delay_ns;
+    for (TimingKnot& knot : continuation.plan.knots) knot.time_ns += delay_ns;
     continuation.plan.settled_ns += delay_ns;
   }
   PathWindow window;
@@ -486,4 +478,4 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
       static_cast<double>(passed_ns) * 1e-9, static_cast<double>(start.time_ns) * 1e-9, true};
 }
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

@@ -14,7 +14,7 @@
 #include "stepdriver_core/trajectory/requests.h"
 #include "trajectory_path.h"
 
-namespace stepdriver::machine {
+namespace stepdriver::motion {
 
 /// The segments that axes follow, without those that they have passed, and what is known about the
 /// motion along them. Positions are in the units of the axes, times in seconds or nanoseconds of
@@ -26,7 +26,7 @@ struct PathWindow {
     std::size_t segment = 0;
     double parameter = 0.0;
     double speed = 0.0;  ///< [unit/s] along the path
-    /// See motion::ContourKnot.
+    /// See motion::TimingKnot.
     double acceleration = 0.0;
     double average = 0.0;
     bool may_begin = false;
@@ -34,13 +34,13 @@ struct PathWindow {
   };
 
   PathFrame frame;
-  std::vector<axis::PathAxis> axes;
+  std::vector<PathAxis> axes;
   std::vector<double> start;  ///< where the first segment begins
   /// With a jerk limit, also those before them whose corners are rounded as far as the first one
   /// ahead, and the `blend` of each is that of the plan.
-  std::vector<motion::ContourSegment> segments;
+  std::vector<CurveSegment> segments;
   std::vector<Knot> knots;      ///< the last one is the end of the path
-  std::int64_t settled_ns = 0;  ///< see motion::ContourPlan
+  std::int64_t settled_ns = 0;  ///< see motion::PathTiming
 
   /// The end of the last segment; the start if none has made a step yet.
   const std::vector<double>& end() const { return segments.empty() ? start : segments.back().end; }
@@ -53,13 +53,13 @@ struct PathWindow {
 ///
 /// The plan uses a thousandth less than the limits of the axes: what planning from a speed may miss
 /// by.
-class QueuedPath : public axis::SharedPath {
+class QueuedPath : public SharedPath {
  public:
   static constexpr double kShareOfLimits = 0.999;
 
   /// @param motion along the window, from time 0 on.
   /// @param more_follows it isn't complete: the axes wait at its end.
-  QueuedPath(const std::shared_ptr<const axis::SharedPath>& motion,
+  QueuedPath(const std::shared_ptr<const SharedPath>& motion,
              std::shared_ptr<const PathWindow> window, bool more_follows);
 
   /// A path that continues this one, and the positions between which both are the same.
@@ -86,18 +86,15 @@ class QueuedPath : public axis::SharedPath {
   PathAhead aheadOf(double position) const;
   std::vector<double> targets() const;  ///< [microsteps] of each joint, its end
 
-  motion::MotionState begin() const override { return motion_->begin(); }
-  motion::MotionState restart(motion::DoubleDouble position) const override {
-    return motion_->restart(position);
-  }
-  motion::Profile plan(std::int64_t at, const motion::MotionState& from,
-                       double speed_override) const override {
+  MotionState begin() const override { return motion_->begin(); }
+  MotionState restart(DoubleDouble position) const override { return motion_->restart(position); }
+  Profile plan(std::int64_t at, const MotionState& from, double speed_override) const override {
     return motion_->plan(at, from, speed_override);
   }
-  motion::Profile planStop(std::int64_t at, const motion::MotionState& from) const override {
+  Profile planStop(std::int64_t at, const MotionState& from) const override {
     return motion_->planStop(at, from);
   }
-  motion::Profile profileOf(std::size_t member, const motion::Profile& path) const override {
+  Profile profileOf(std::size_t member, const Profile& path) const override {
     return motion_->profileOf(member, path);
   }
   bool waitsAtEnd() const override { return more_follows_; }
@@ -111,32 +108,29 @@ class QueuedPath : public axis::SharedPath {
     std::vector<double> velocity;
   };
 
-  std::vector<motion::ContourSegment> read(const std::vector<PathSegment>& given) const;
+  std::vector<CurveSegment> read(const std::vector<PathSegment>& given) const;
   std::size_t segmentAt(std::int64_t time_ns) const;
   std::size_t firstRoundedInto(std::size_t segment) const;
-  std::vector<motion::ContourSegment> aroundStart(const Start& start, std::size_t first) const;
+  std::vector<CurveSegment> aroundStart(const Start& start, std::size_t first) const;
   std::vector<Start> startsFrom(std::int64_t from_ns) const;
   static Start atKnot(const PathWindow::Knot& knot);
   Start onStraight(std::size_t knot, std::int64_t time_ns) const;
   Start atRest() const;
-  std::optional<Continuation> continueFrom(Start start,
-                                           const std::vector<motion::ContourSegment>& added,
+  std::optional<Continuation> continueFrom(Start start, const std::vector<CurveSegment>& added,
                                            bool more_follows, int most_halvings) const;
   Longer continued(const Start& start, Continuation continuation,
-                   const std::vector<motion::ContourSegment>& added, bool more_follows,
+                   const std::vector<CurveSegment>& added, bool more_follows,
                    std::int64_t passed_ns) const;
-  JointPlace jointAt(const Start& start, const motion::ContourPoint& place) const;
-  void adjust(Start& start, const motion::ContourPoint& planned,
-              const std::vector<axis::PathStart>& states) const;
-  std::optional<std::vector<axis::PathStart>> statesAt(const Start& start,
-                                                       const JointPlace& joint) const;
-  std::shared_ptr<const axis::TrajectoryPath> joined(
-      const Start& start, const Continuation& continuation,
-      const std::vector<axis::TrajectoryPoint>& points, std::int64_t passed_ns) const;
+  JointPlace jointAt(const Start& start, const PathPoint& place) const;
+  void adjust(Start& start, const PathPoint& planned, const std::vector<PathStart>& states) const;
+  std::optional<std::vector<PathStart>> statesAt(const Start& start, const JointPlace& joint) const;
+  std::shared_ptr<const TrajectoryPath> joined(const Start& start, const Continuation& continuation,
+                                               const std::vector<TrajectoryPoint>& points,
+                                               std::int64_t passed_ns) const;
 
-  std::shared_ptr<const axis::TrajectoryPath> motion_;
+  std::shared_ptr<const TrajectoryPath> motion_;
   std::shared_ptr<const PathWindow> window_;
   bool more_follows_;
 };
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

@@ -5,7 +5,7 @@
 
 #include "profile/profile.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// A path of several axes: the position of each axis for each position along the path. One profile
 /// describes the motion along the path for all of them, so that they stay on it at any speed and
@@ -22,20 +22,17 @@ class SharedPath {
   SharedPath& operator=(const SharedPath&) = delete;
 
   /// The position and the rate at the beginning of the path.
-  virtual motion::MotionState begin() const = 0;
+  virtual MotionState begin() const = 0;
   /// The state in which a motion continues from rest at a position on the path.
-  virtual motion::MotionState restart(motion::DoubleDouble position) const {
-    return {position, 0.0, 0.0};
-  }
+  virtual MotionState restart(DoubleDouble position) const { return {position, 0.0, 0.0}; }
   /// Whether the axes wait at its end for another path that continues it.
   virtual bool waitsAtEnd() const { return false; }
   /// The motion along the path to its end, from a position on it.
-  virtual motion::Profile plan(std::int64_t at, const motion::MotionState& from,
-                               double speed_override) const = 0;
+  virtual Profile plan(std::int64_t at, const MotionState& from, double speed_override) const = 0;
   /// The motion along the path to rest.
-  virtual motion::Profile planStop(std::int64_t at, const motion::MotionState& from) const = 0;
+  virtual Profile planStop(std::int64_t at, const MotionState& from) const = 0;
   /// The motion of one axis's motor along the path [microsteps].
-  virtual motion::Profile profileOf(std::size_t member, const motion::Profile& path) const = 0;
+  virtual Profile profileOf(std::size_t member, const Profile& path) const = 0;
 };
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

@@ -29,7 +29,7 @@ double reach(const Piece& piece) {
          std::abs(piece.j) * t * t * t / 6.0;
 }
 
-void appendCubics(std::vector<Piece>& pieces, const Segment& segment, const Quintic& curve,
+void appendCubics(std::vector<Piece>& pieces, const SplineSegment& segment, const Quintic& curve,
                   double count) {
   const DoubleDouble duration = segment.duration();
   const DoubleDouble part = duration / DoubleDouble(count);
@@ -51,13 +51,14 @@ bool exceeds(const std::vector<Piece>& pieces, std::size_t from, double accelera
              double speed) {
   const auto first = pieces.begin() + static_cast<std::ptrdiff_t>(from);
   return std::any_of(first, pieces.end(), [&](const Piece& piece) {
-    const RoughPiece rough(piece);
+    const DoublePiece rough(piece);
     return rough.highestAcceleration(0.0, rough.duration) > acceleration ||
            rough.highestSpeed(0.0, rough.duration) > speed;
   });
 }
 
-void appendQuintic(std::vector<Piece>& pieces, const Segment& segment, double most_acceleration) {
+void appendQuintic(std::vector<Piece>& pieces, const SplineSegment& segment,
+                   double most_acceleration) {
   const Quintic curve = segment.quintic();
   requireReach(curve.reach(), segment.index);
   const double fourth = curve.largestFourthDerivative();
@@ -75,7 +76,7 @@ void appendQuintic(std::vector<Piece>& pieces, const Segment& segment, double mo
 }
 
 // @pre kind() is kCubic
-Piece cubicOf(const Segment& segment) {
+Piece cubicOf(const SplineSegment& segment) {
   return cubic(segment.duration(), segment.begin.position, *segment.begin.velocity,
                segment.end.position, *segment.end.velocity);
 }
@@ -92,7 +93,7 @@ struct GentlestMotion {
 // u = v1 - v0. Without a limit of the speed, the acceleration is x for a time (T + u/x)/2 and then
 // -x. It has the sign of c, and x^2 T^2/4 - c x - u^2/4 = 0. With the limit V, it is
 // ((V - v0)^2 + (V - v1)^2)/(2 (V T - (p1 - p0))) on both sides of V.
-GentlestMotion gentlestMotion(const Segment& segment, double most_speed) {
+GentlestMotion gentlestMotion(const SplineSegment& segment, double most_speed) {
   const double time = segment.duration().value();
   const double v0 = *segment.begin.velocity;
   const double v1 = *segment.end.velocity;
@@ -117,7 +118,7 @@ GentlestMotion gentlestMotion(const Segment& segment, double most_speed) {
   return {up, limit, time - up - down};
 }
 
-void appendGentlest(std::vector<Piece>& pieces, const Segment& segment, double most_speed) {
+void appendGentlest(std::vector<Piece>& pieces, const SplineSegment& segment, double most_speed) {
   // Of a segment: a shorter stretch is left out, which changes the accelerations of the others by
   // less than four times this part.
   constexpr double kNothing = 1e-6;
@@ -141,14 +142,14 @@ void appendGentlest(std::vector<Piece>& pieces, const Segment& segment, double m
   pieces.push_back(cubic(duration - done, from, v, segment.end.position, *segment.end.velocity));
 }
 
-void appendCubic(std::vector<Piece>& pieces, const Segment& segment) {
+void appendCubic(std::vector<Piece>& pieces, const SplineSegment& segment) {
   pieces.push_back(cubicOf(segment));
   requireReach(reach(pieces.back()), segment.index);
 }
 
 // Replaces the curve of a segment, the pieces from an index on, by the first gentler one that keeps
 // to the limits. If none does, it stays.
-void makeGentler(std::vector<Piece>& pieces, std::size_t from, const Segment& segment,
+void makeGentler(std::vector<Piece>& pieces, std::size_t from, const SplineSegment& segment,
                  const SplineLimits& limits) {
   const double most = limits.gentler_beyond;
   const auto keeps_limits = [&] {
@@ -167,7 +168,7 @@ void makeGentler(std::vector<Piece>& pieces, std::size_t from, const Segment& se
   pieces.insert(pieces.end(), given.begin(), given.end());
 }
 
-void append(std::vector<Piece>& pieces, const Segment& segment, const SplineLimits& limits) {
+void append(std::vector<Piece>& pieces, const SplineSegment& segment, const SplineLimits& limits) {
   const std::size_t before = pieces.size();
   switch (segment.kind()) {
     case SegmentKind::kLine:
@@ -189,14 +190,14 @@ struct Ends {
   double end = 0.0;
 };
 
-Ends takeJerk(SplineJerk& worst, const Segment& segment, const Piece* made = nullptr) {
+Ends takeJerk(SplineJerk& worst, const SplineSegment& segment, const Piece* made = nullptr) {
   const double start = static_cast<double>(segment.begin.time_ns) * 1e-9;
   const auto take = [&](double jerk, double time_s) {
     if (std::abs(jerk) > std::abs(worst.jerk.value)) worst.jerk = {jerk, time_s};
   };
   if (segment.kind() == SegmentKind::kLine) return {};
   if (segment.kind() == SegmentKind::kCubic) {
-    const RoughPiece piece(made != nullptr ? *made : cubicOf(segment));
+    const DoublePiece piece(made != nullptr ? *made : cubicOf(segment));
     take(piece.j, start);
     return {piece.a, piece.acceleration(piece.duration)};
   }
@@ -218,7 +219,7 @@ class JerkMeter {
   explicit JerkMeter(double acceleration_before) : before_(acceleration_before) {}
 
   /// @param made the cubic of the segment, if it has been made.
-  void take(const Segment& segment, const Piece* made = nullptr) {
+  void take(const SplineSegment& segment, const Piece* made = nullptr) {
     const Ends ends = takeJerk(worst_, segment, made);
     jumpTo(ends.begin, segment.begin.time_ns);
     before_ = ends.end;
@@ -236,7 +237,7 @@ class JerkMeter {
   double before_;
 };
 
-double accelerationAtBegin(const Segment& segment) {
+double accelerationAtBegin(const SplineSegment& segment) {
   SplineJerk ignored;
   return takeJerk(ignored, segment).begin;
 }
@@ -246,7 +247,7 @@ double accelerationAtBegin(const Segment& segment) {
 Profile planSpline(std::int64_t start_ns, const MotionState& from,
                    const std::vector<Waypoint>& waypoints, const SplineLimits& limits) {
   requirePlannable(from, waypoints);
-  const Segments segments(waypoints);
+  const SplineSegments segments(waypoints);
   std::vector<Piece> pieces;
   pieces.reserve(waypoints.size());
   append(pieces, segments.first(from), limits);
@@ -258,7 +259,7 @@ Profile planSpline(std::int64_t start_ns, const MotionState& from,
 
 SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& waypoints) {
   requirePlannable(from, waypoints);
-  const Segments segments(waypoints);
+  const SplineSegments segments(waypoints);
   JerkMeter meter(from.acceleration);
   meter.take(segments.first(from));
   for (std::size_t i = 1; i < segments.size(); ++i) meter.take(segments.at(i));
@@ -269,8 +270,8 @@ SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& wayp
 SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, const SplineLimits& limits)
     : limits_(limits) {
   requireWaypoints(waypoints);
-  const Segments segments(waypoints);
-  Segment segment = segments.first({});
+  const SplineSegments segments(waypoints);
+  SplineSegment segment = segments.first({});
   first_index_ = segment.index;
   first_ = waypoints[segment.index];
   first_.position = segment.end.position.value();

@@ -29,14 +29,14 @@ double Quintic::reach() const {
   return std::abs(c1.hi) + std::abs(c2.hi) + std::abs(c3.hi) + std::abs(c4.hi) + std::abs(c5.hi);
 }
 
-SegmentKind Segment::kind() const {
+SegmentKind SplineSegment::kind() const {
   if (!begin.velocity || !end.velocity) return SegmentKind::kLine;
   return begin.acceleration && end.acceleration ? SegmentKind::kQuintic : SegmentKind::kCubic;
 }
 
-DoubleDouble Segment::duration() const { return secondsOf(end.time_ns - begin.time_ns); }
+DoubleDouble SplineSegment::duration() const { return secondsOf(end.time_ns - begin.time_ns); }
 
-Quintic Segment::quintic() const {
+Quintic SplineSegment::quintic() const {
   const DoubleDouble time = duration();
   const DoubleDouble way = end.position - begin.position;
   const DoubleDouble v0 = time * *begin.velocity;
@@ -52,24 +52,24 @@ Quintic Segment::quintic() const {
           times(6.0, way) - times(3.0, v0) - times(3.0, v1) - a0 + a1};
 }
 
-Segments::Segments(const std::vector<Waypoint>& waypoints)
+SplineSegments::SplineSegments(const std::vector<Waypoint>& waypoints)
     : waypoints_(waypoints), skipped_(waypoints.front().time_ns == 0 ? 1 : 0) {}
 
-Segment Segments::first(const MotionState& from) const {
+SplineSegment SplineSegments::first(const MotionState& from) const {
   return {{0, from.position, from.velocity, from.acceleration}, knot(skipped_), skipped_};
 }
 
-Segment Segments::at(std::size_t index) const {
+SplineSegment SplineSegments::at(std::size_t index) const {
   const std::size_t to = skipped_ + index;
   return {knot(to - 1), knot(to), to};
 }
 
-void Segments::advance(Segment& segment) const {
+void SplineSegments::advance(SplineSegment& segment) const {
   segment.begin = segment.end;
   segment.end = knot(++segment.index);
 }
 
-Knot Segments::knot(std::size_t index) const {
+SplineKnot SplineSegments::knot(std::size_t index) const {
   const Waypoint& waypoint = waypoints_[index];
   const bool last = index + 1 == waypoints_.size();
   const double position = last && !waypoint.may_rest

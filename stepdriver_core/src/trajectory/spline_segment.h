@@ -11,7 +11,7 @@
 namespace stepdriver::motion {
 
 /// One end of a segment.
-struct Knot {
+struct SplineKnot {
   std::int64_t time_ns = 0;
   DoubleDouble position;
   std::optional<double> velocity;
@@ -33,9 +33,9 @@ struct Quintic {
 /// The kind of curve of a segment, see planSpline().
 enum class SegmentKind { kLine, kCubic, kQuintic };
 
-struct Segment {
-  Knot begin;
-  Knot end;
+struct SplineSegment {
+  SplineKnot begin;
+  SplineKnot end;
   std::size_t index = 0;  ///< of the waypoint at its end
 
   SegmentKind kind() const;
@@ -46,20 +46,20 @@ struct Segment {
 
 /// The segments of a trajectory, each made on demand. The first one begins at the start of the
 /// motion, each other one at a waypoint.
-class Segments {
+class SplineSegments {
  public:
   /// @param waypoints outlive this. @pre requirePlannable()
-  explicit Segments(const std::vector<Waypoint>& waypoints);
+  explicit SplineSegments(const std::vector<Waypoint>& waypoints);
 
   std::size_t size() const { return waypoints_.size() - skipped_; }
-  Segment first(const MotionState& from) const;
+  SplineSegment first(const MotionState& from) const;
   /// @pre index > 0
-  Segment at(std::size_t index) const;
+  SplineSegment at(std::size_t index) const;
   /// From a segment to the next one.
-  void advance(Segment& segment) const;
+  void advance(SplineSegment& segment) const;
 
  private:
-  Knot knot(std::size_t waypoint) const;
+  SplineKnot knot(std::size_t waypoint) const;
 
   const std::vector<Waypoint>& waypoints_;
   std::size_t skipped_;  // waypoints: one at time 0 has passed when the motion starts

@@ -11,26 +11,24 @@
 #include "profile/profile_parts.h"
 #include "stepdriver_core/trajectory/requests.h"
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 namespace {
 
-using motion::DoubleDouble;
-
-constexpr double kSteepestJerk = motion::kSteepestSlope * motion::kSteepestSlope;  // 1/s^2
 constexpr double kGentler = 0.8;
 constexpr int kTries = 60;             // down to a millionth of the steepest
 constexpr double kLastResort = 1e-6;   // of the steepest
 constexpr double kFirstDelay = 0.010;  // s
-// Braking as steeply as each place allows: at most this many slopes, none shorter than this.
+// A deceleration as steep as each place allows has at most this many slopes, none shorter than
+// this.
 constexpr double kMostSlopes = 100.0;
 constexpr double kMostCurves = 40.0;      // with a jerk limit
 constexpr double kShortestSlope = 0.001;  // s
 
-// When a path from planRate() reaches the rate, or its end [s].
-double timeToRate(const motion::Profile& path, double rate) {
+// When a path from planFeedRate() reaches the rate, or its end [s].
+double timeToRate(const Profile& path, double rate) {
   const double duration = path.duration().value();
   if (path.pieceCount() == 0) return duration;
-  const motion::Piece last = path.pieces().back();
+  const Piece last = path.pieces().back();
   const bool there = rate > 0.0 && last.v0 == rate && last.a == 0.0 && last.j == 0.0;
   return there ? duration - last.duration.value() : duration;
 }
@@ -49,117 +47,114 @@ void TrajectoryPath::endTogether() {
   for (Member& member : members_) {
     const DoubleDouble left = longest - member.curve->duration();
     if (!(left.hi > 0.0)) continue;
-    motion::Sections sections;
-    sections.add(motion::Excerpt{member.curve, 0.0, member.curve->duration()});
-    sections.add(motion::Piece{left, member.curve->endPosition()});
-    member.curve = std::make_shared<const motion::Profile>(0, std::move(sections));
+    Sections sections;
+    sections.add(Excerpt{member.curve, 0.0, member.curve->duration()});
+    sections.add(Piece{left, member.curve->endPosition()});
+    member.curve = std::make_shared<const Profile>(0, std::move(sections));
   }
 }
 
-motion::Profile TrajectoryPath::plan(std::int64_t at_ns, const motion::MotionState& from,
-                                     double speed_override) const {
+Profile TrajectoryPath::plan(std::int64_t at_ns, const MotionState& from,
+                             double speed_override) const {
   return onPath(slowDown(at_ns, onCurves(from), std::min(speed_override, 1.0), &Member::bounds));
 }
 
-motion::Profile TrajectoryPath::planStop(std::int64_t at_ns,
-                                         const motion::MotionState& from) const {
+Profile TrajectoryPath::planStop(std::int64_t at_ns, const MotionState& from) const {
   return onPath(slowDown(at_ns, onCurves(from), 0.0, &Member::stop_bounds));
 }
 
-motion::Profile TrajectoryPath::slowDown(std::int64_t at_ns, const motion::MotionState& from,
-                                         double rate, Bounds bounds) const {
-  motion::Profile even = changeRate(at_ns, from, rate, bounds);
+Profile TrajectoryPath::slowDown(std::int64_t at_ns, const MotionState& from, double rate,
+                                 Bounds bounds) const {
+  Profile even = changeRate(at_ns, from, rate, bounds);
   const double time = timeToRate(even, rate);
   if (rate < from.velocity && time > kShortestSlope) {
-    if (std::optional<motion::Profile> steeper = brake(at_ns, from, rate, bounds, time)) {
+    if (std::optional<Profile> steeper = brake(at_ns, from, rate, bounds, time)) {
       return *std::move(steeper);
     }
   }
   return even;
 }
 
-std::optional<motion::Profile> TrajectoryPath::brake(std::int64_t at_ns,
-                                                     const motion::MotionState& from, double rate,
-                                                     Bounds bounds, double sooner_than) const {
+std::optional<Profile> TrajectoryPath::brake(std::int64_t at_ns, const MotionState& from,
+                                             double rate, Bounds bounds, double sooner_than) const {
   const bool smooth = std::any_of(members_.begin(), members_.end(), [&](const Member& member) {
     return (member.*bounds).jerk > 0.0;
   });
   // The tolerance is for what a trajectory itself may exceed. With a jerk limit it needs that even
   // at a slightly lower rate.
   const double part = smooth ? 1.0 : 1.0 / (1.0 + kTrajectoryTolerance);
-  std::vector<motion::BoundCourse> courses;
-  courses.reserve(members_.size());
+  std::vector<LimitedCurve> curves;
+  curves.reserve(members_.size());
   for (const Member& member : members_) {
-    const motion::MotorBounds& given = member.*bounds;
-    courses.push_back({member.curve, {part * given.acceleration, given.jerk}});
+    const MotorBounds& given = member.*bounds;
+    curves.push_back({member.curve, {part * given.acceleration, given.jerk}});
   }
   const DoubleDouble end = members_.front().curve->duration();
   const double slice = std::max(kShortestSlope, sooner_than / (smooth ? kMostCurves : kMostSlopes));
-  const auto plan = smooth ? motion::planSmoothBraking : motion::planBraking;
-  return plan(at_ns, from, rate, courses, slice, sooner_than, end);
+  const auto plan = smooth ? planJerkLimitedFeedDeceleration : planFeedDeceleration;
+  return plan(at_ns, from, rate, curves, slice, sooner_than, end);
 }
 
-motion::MotionState TrajectoryPath::restart(DoubleDouble position) const {
-  const std::int64_t at_ns = motion::splitNanoseconds(position - origin_).whole;
+MotionState TrajectoryPath::restart(DoubleDouble position) const {
+  const std::int64_t at_ns = splitNanoseconds(position - origin_).whole;
   const bool rests = std::all_of(members_.begin(), members_.end(), [&](const Member& member) {
     return member.curve->stateAt(at_ns).velocity == 0.0;
   });
   return {position, rests ? 1.0 : 0.0, 0.0};
 }
 
-motion::Profile TrajectoryPath::onPath(const motion::Profile& on_curves) const {
-  return origin_.hi == 0.0 ? on_curves : motion::scaled(on_curves, origin_, 1.0);
+Profile TrajectoryPath::onPath(const Profile& on_curves) const {
+  return origin_.hi == 0.0 ? on_curves : scaled(on_curves, origin_, 1.0);
 }
 
-motion::MotionState TrajectoryPath::onCurves(const motion::MotionState& on_path) const {
-  motion::MotionState state = on_path;
+MotionState TrajectoryPath::onCurves(const MotionState& on_path) const {
+  MotionState state = on_path;
   state.position = state.position - origin_;
   return state;
 }
 
 // As fast as the limits of all axes allow. If they never leave room for it, the trajectory
 // continues almost unchanged: it also ends at rest.
-motion::Profile TrajectoryPath::changeRate(std::int64_t at_ns, const motion::MotionState& from,
-                                           double rate, Bounds bounds) const {
+Profile TrajectoryPath::changeRate(std::int64_t at_ns, const MotionState& from, double rate,
+                                   Bounds bounds) const {
   const DoubleDouble end = members_.front().curve->duration();
   if (from.velocity == rate && from.acceleration == 0.0) {
-    return motion::planRate(at_ns, from, rate, {1.0, 1.0}, 0.0, end);
+    return planFeedRate(at_ns, from, rate, {1.0, 1.0}, 0.0, end);
   }
-  if (std::optional<motion::Profile> fastest = fastestChange(at_ns, from, rate, bounds)) {
+  if (std::optional<Profile> fastest = fastestChange(at_ns, from, rate, bounds)) {
     return *std::move(fastest);
   }
-  std::vector<motion::Piece> pieces = levelOff(at_ns, from);
-  motion::MotionState level{from.position, from.velocity, 0.0};
+  std::vector<Piece> pieces = rampDown(at_ns, from);
+  MotionState level{from.position, from.velocity, 0.0};
   if (!pieces.empty()) {
-    const motion::Piece& last = pieces.back();
+    const Piece& last = pieces.back();
     level.position = last.positionAt(last.duration);
     level.velocity = last.velocityAt(last.duration).value();
   }
-  std::optional<motion::Profile> change = fastestChange(at_ns, level, rate, bounds);
+  std::optional<Profile> change = fastestChange(at_ns, level, rate, bounds);
   if (!change) {
-    motion::RateLimits limits = steepest(level, 0.0, bounds);
+    FeedRateLimits limits = steepest(level, 0.0, bounds);
     limits.slope *= kLastResort;
     limits.jerk *= kLastResort;
-    change = motion::planRate(at_ns, level, rate, limits, 0.0, end);
+    change = planFeedRate(at_ns, level, rate, limits, 0.0, end);
   }
-  for (const motion::Piece& piece : change->pieces()) pieces.push_back(piece);
+  for (const Piece& piece : change->pieces()) pieces.push_back(piece);
   if (pieces.empty()) return {at_ns, level.position};
   return {at_ns, std::move(pieces)};
 }
 
 // Now, or, if one of the axes is at its limit already, as soon as it leaves some room.
-std::optional<motion::Profile> TrajectoryPath::fastestChange(std::int64_t at_ns,
-                                                             const motion::MotionState& from,
-                                                             double rate, Bounds bounds) const {
+std::optional<Profile> TrajectoryPath::fastestChange(std::int64_t at_ns, const MotionState& from,
+                                                     double rate, Bounds bounds) const {
   const DoubleDouble end = members_.front().curve->duration();
   const double left = (end - from.position).value();
-  std::optional<motion::Profile> best;
+  std::optional<Profile> best;
   double soonest = std::numeric_limits<double>::infinity();
   double delay = 0.0;
   do {
-    motion::RateLimits limits = steepest(from, delay, bounds);
+    FeedRateLimits limits = steepest(from, delay, bounds);
     for (int i = 0; i < kTries; ++i, limits.slope *= kGentler, limits.jerk *= kGentler) {
-      motion::Profile path = motion::planRate(at_ns, from, rate, limits, delay, end);
+      Profile path = planFeedRate(at_ns, from, rate, limits, delay, end);
       const double time = timeToRate(path, rate);
       if (time >= soonest) break;
       if (!keeps(motion::part(path, 0.0, time), bounds)) continue;
@@ -174,28 +169,27 @@ std::optional<motion::Profile> TrajectoryPath::fastestChange(std::int64_t at_ns,
 
 // Ends the slope of a stop within the limits of stops: the trajectory may have a lower jerk limit,
 // which can't take it back in time.
-std::vector<motion::Piece> TrajectoryPath::levelOff(std::int64_t at_ns,
-                                                    const motion::MotionState& from) const {
-  motion::RateLimits limits = steepest(from, 0.0, &Member::stop_bounds);
+std::vector<Piece> TrajectoryPath::rampDown(std::int64_t at_ns, const MotionState& from) const {
+  FeedRateLimits limits = steepest(from, 0.0, &Member::stop_bounds);
   if (from.acceleration == 0.0 || limits.jerk == 0.0) return {};
   const DoubleDouble end = members_.front().curve->duration();
   for (int i = 0; i < kTries; ++i, limits.jerk *= kGentler) {
     const double change = from.acceleration * std::abs(from.acceleration) / (2.0 * limits.jerk);
     const double rate = std::clamp(from.velocity + change, 0.0, 1.0);
-    const motion::Profile path = motion::planRate(at_ns, from, rate, limits, 0.0, end);
-    const motion::Profile level_off = motion::part(path, 0.0, timeToRate(path, rate));
-    if (!keeps(level_off, &Member::stop_bounds)) continue;
-    return {level_off.pieces().begin(), level_off.pieces().end()};
+    const Profile path = planFeedRate(at_ns, from, rate, limits, 0.0, end);
+    const Profile ramp_down = motion::part(path, 0.0, timeToRate(path, rate));
+    if (!keeps(ramp_down, &Member::stop_bounds)) continue;
+    return {ramp_down.pieces().begin(), ramp_down.pieces().end()};
   }
   return {};
 }
 
-motion::RateLimits TrajectoryPath::steepest(const motion::MotionState& from, double delay,
-                                            Bounds bounds) const {
+FeedRateLimits TrajectoryPath::steepest(const MotionState& from, double delay,
+                                        Bounds bounds) const {
   const DoubleDouble place = from.position + DoubleDouble(delay * from.velocity);
-  motion::RateLimits limits{motion::kSteepestSlope, 0.0};
+  FeedRateLimits limits{kSteepestSlope, 0.0};
   for (std::size_t member = 0; member < members_.size(); ++member) {
-    const auto state = members_[member].curve->stateAt(motion::splitNanoseconds(place).whole);
+    const auto state = members_[member].curve->stateAt(splitNanoseconds(place).whole);
     const double speed = std::abs(state.velocity);
     if ((members_[member].*bounds).jerk > 0.0) {
       const double jerk =
@@ -208,17 +202,16 @@ motion::RateLimits TrajectoryPath::steepest(const motion::MotionState& from, dou
   return limits;
 }
 
-bool TrajectoryPath::keeps(const motion::Profile& path, Bounds bounds) const {
+bool TrajectoryPath::keeps(const Profile& path, Bounds bounds) const {
   for (std::size_t member = 0; member < members_.size(); ++member) {
-    if (!motion::staysWithin(*members_[member].curve, path, members_[member].*bounds)) return false;
+    if (!staysWithin(*members_[member].curve, path, members_[member].*bounds)) return false;
   }
   return true;
 }
 
-motion::Profile TrajectoryPath::profileOf(std::size_t member, const motion::Profile& path) const {
-  if (origin_.hi == 0.0) return motion::composeAlong(members_[member].curve, path);
-  return motion::composeAlong(members_[member].curve,
-                              motion::scaled(path, DoubleDouble() - origin_, 1.0));
+Profile TrajectoryPath::profileOf(std::size_t member, const Profile& path) const {
+  if (origin_.hi == 0.0) return composeAlong(members_[member].curve, path);
+  return composeAlong(members_[member].curve, scaled(path, DoubleDouble() - origin_, 1.0));
 }
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion

@@ -17,7 +17,7 @@ struct NodeConfig : setup::MachineConfig {
   bool urdf_limits = true;           ///< the limits of robot_description apply as well
   bool publish_clock = false;        ///< the time of the simulated rig on /clock
   bool stop_on_master_lost = false;  ///< if the ROS master doesn't answer, all axes come to rest
-  bool allow_slower = false;         ///< machine::TrajectoryRequest::allow_slower
+  bool allow_slower = false;         ///< motion::TrajectoryRequest::allow_slower
   machine::SetpointMode setpoint_mode = machine::SetpointMode::kPosition;
   double setpoint_timeout = 0.2;  ///< [s] without a setpoint until the axis comes to rest
   std::string hardware_id;        ///< for diagnostics; empty: made from the other facts

@@ -6,8 +6,8 @@ namespace stepdriver::ros_node {
 
 /// @tparam Fields those of a request of the service move_line, or of a goal of the action.
 template <typename Fields>
-machine::LineRequest lineRequest(const Fields& fields) {
-  machine::LineRequest line;
+motion::LineRequest lineRequest(const Fields& fields) {
+  motion::LineRequest line;
   line.names = fields.name;
   line.positions = fields.position;
   line.relative = fields.relative != 0;

@@ -10,7 +10,7 @@
 namespace stepdriver::ros_node {
 namespace {
 
-using Shape = machine::PathSegment::Shape;
+using Shape = motion::PathSegment::Shape;
 
 template <typename From, typename To>
 void takeTwo(const From& from, To& to, std::size_t index, const char* what) {
@@ -21,8 +21,8 @@ void takeTwo(const From& from, To& to, std::size_t index, const char* what) {
   std::copy(from.begin(), from.end(), to.begin());
 }
 
-machine::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
-  machine::PathSegment segment;
+motion::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
+  motion::PathSegment segment;
   switch (fields.shape) {
     case PathSegment::LINE:
       segment.shape = Shape::kLine;
@@ -60,12 +60,12 @@ machine::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
 
 }  // namespace
 
-std::vector<machine::PathSegment> pathSegments(const std::vector<PathSegment>& fields) {
-  if (fields.size() > machine::kMostPathSegments) {  // before they are copied
+std::vector<motion::PathSegment> pathSegments(const std::vector<PathSegment>& fields) {
+  if (fields.size() > motion::kMostPathSegments) {  // before they are copied
     throw Refused(fmt::format("the path has {} segments, but must have 1 to {}", fields.size(),
-                              machine::kMostPathSegments));
+                              motion::kMostPathSegments));
   }
-  std::vector<machine::PathSegment> segments;
+  std::vector<motion::PathSegment> segments;
   segments.reserve(fields.size());
   for (std::size_t i = 0; i < fields.size(); ++i) {
     segments.push_back(segmentOf(fields[i], i));

@@ -10,15 +10,15 @@ namespace stepdriver::ros_node {
 
 /// @throw Refused if there are too many segments, if one has no known shape, or an arc no plane or
 ///   point.
-std::vector<machine::PathSegment> pathSegments(const std::vector<PathSegment>& fields);
+std::vector<motion::PathSegment> pathSegments(const std::vector<PathSegment>& fields);
 
 /// A path to which nothing is appended.
 ///
 /// @tparam Fields those of a request of the service plan_path, or of pathRequest().
 /// @throw Refused as pathSegments().
 template <typename Fields>
-machine::PathRequest wholePath(const Fields& fields) {
-  machine::PathRequest path;
+motion::PathRequest wholePath(const Fields& fields) {
+  motion::PathRequest path;
   path.names = fields.name;
   path.segments = pathSegments(fields.segments);
   path.relative = fields.relative != 0;
@@ -30,8 +30,8 @@ machine::PathRequest wholePath(const Fields& fields) {
 /// @tparam Fields those of a request of the service follow_path, or of a goal of the action.
 /// @throw Refused as pathSegments().
 template <typename Fields>
-machine::PathRequest pathRequest(const Fields& fields) {
-  machine::PathRequest path = wholePath(fields);
+motion::PathRequest pathRequest(const Fields& fields) {
+  motion::PathRequest path = wholePath(fields);
   path.more_follows = fields.more_follows != 0;
   return path;
 }

@@ -20,11 +20,11 @@ double RandomCommands::velocity(const axis::Axis& axis) {
 
 // There and back, from wherever the axes are: many are refused because of that.
 void RandomCommands::trajectory(double begin_in) {
-  machine::TrajectoryRequest request;
+  motion::TrajectoryRequest request;
   request.names = names_;
   request.begin_in = begin_in;
   for (int i = 1; i <= 2; ++i) {
-    axis::TrajectoryPoint point;
+    motion::TrajectoryPoint point;
     point.time = 0.8 * i;
     for (const std::string& name : names_) {
       const double speed = machine_.axis(name).config().max_speed;
@@ -40,13 +40,13 @@ void RandomCommands::trajectory(double begin_in) {
 
 // Small squares around wherever the axes are.
 void RandomCommands::beginPath() {
-  machine::PathRequest request;
+  motion::PathRequest request;
   request.names = names_;
   request.relative = true;
   request.tolerance = random_.within(0.0, 0.001);
   request.more_follows = random_.chance(0.8);
   for (const double way : {0.004, 0.0, -0.004}) {
-    machine::PathSegment& segment = request.segments.emplace_back();
+    motion::PathSegment& segment = request.segments.emplace_back();
     for (std::size_t i = 0; i < names_.size(); ++i) {
       segment.end.push_back(i % 2 == 0 ? way : way * way * 500.0);
     }
@@ -55,9 +55,9 @@ void RandomCommands::beginPath() {
 }
 
 void RandomCommands::appendToPath() {
-  machine::PathAppend append{path_, {}, random_.chance(0.7)};
+  motion::PathAppend append{path_, {}, random_.chance(0.7)};
   for (int i = 0; i < 3; ++i) {
-    machine::PathSegment& segment = append.segments.emplace_back();
+    motion::PathSegment& segment = append.segments.emplace_back();
     for (std::size_t k = 0; k < names_.size(); ++k) {
       segment.end.push_back(random_.within(-0.005, 0.005));
     }

@@ -163,7 +163,7 @@ TEST(Alarm, BringsTheAxesOfALineToRestOnIt) {
   x.fault->ramps = true;
   Bench bench({x, linearAxis("y")}, true, kSpeed);
   bench.rig.setFaults("x", brokenAfter(2000));
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.09, 0.045};
   const machine::CoordinatedMove move = bench.machine->moveLine(line);

@@ -440,7 +440,7 @@ TEST_F(AxisLimitsTest, AxesThatMoveTogetherKeepWhatTheyBeganWith) {
   config::AxisConfig x_config = linearAxis("x");
   config::AxisConfig y_config = linearAxis("y");
   bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{x_config, y_config});
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.05, 0.025};
   const auto move = bench->machine->moveLine(line);
@@ -458,7 +458,7 @@ TEST_F(AxisLimitsTest, AxesThatMoveTogetherStopAtOnceHoweverSlowTheyAre) {
   for (axis::Axis* axis : {&bench->axis("x"), &bench->axis("y")}) {
     axis->setLimits({1e-6, 0.0, 0.0, 0.0});
   }
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.05, 0.025};
   const auto move = bench->machine->moveLine(line);

@@ -264,7 +264,7 @@ TEST_F(CoreXyHoming, IsRefusedWhileTheOtherMoves) {
 
 // It would move the motors that the other one needs to find its switch.
 TEST_F(CoreXyHoming, IsNotDisturbedByATrajectoryOfTheOtherThatBeginsMeanwhile) {
-  machine::TrajectoryRequest later{{"y"}, {{1.0, {0.01}, {0.0}, {}}}};
+  motion::TrajectoryRequest later{{"y"}, {{1.0, {0.01}, {0.0}, {}}}};
   later.begin_in = 0.5;
   const auto move = bench.machine->followTrajectory(later);
   EXPECT_EQ(x().home().end, axis::HomingEnd::kHomed);
@@ -362,7 +362,7 @@ TEST(SkewedAxes, ReachTheirTargetsToHalfAMicrostepOfEachMotorByEveryKindOfMotion
     } else {
       wanted = {place(random), place(random)};
       const std::vector<double> to{wanted[0], wanted[1]};
-      machine::PathSegment segment;
+      motion::PathSegment segment;
       segment.end = to;
       const machine::CoordinatedMove move =
           kind == 3   ? bench.machine->moveLine({names, to})

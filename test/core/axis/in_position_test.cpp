@@ -163,7 +163,7 @@ TEST_F(InPositionOfAnAxis, IsNotAwaitedLongerIfTheSpeedOverrideChanges) {
 TEST_F(InPositionOfAnAxis, OfEachAxisEndsALine) {
   build({with(linearAxis("x")), with(linearAxis("y"))});
   neverInPosition("y");
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.01, 0.01};
   const auto result = bench_->machine->wait(bench_->machine->moveLine(line));

@@ -108,7 +108,7 @@ TEST_F(RelativeMoves, CountFromAnAbsoluteTarget) {
 }
 
 TEST_F(RelativeMoves, CountFromTheEndOfATrajectory) {
-  machine::TrajectoryRequest request{{"x"}, {{0.5, {10.4 * kMicrostep}, {0.0}, {0.0}}}};
+  motion::TrajectoryRequest request{{"x"}, {{0.5, {10.4 * kMicrostep}, {0.0}, {0.0}}}};
   bench->machine->wait(bench->machine->followTrajectory(request));
   move(0.4 * kMicrostep);
   EXPECT_EQ(bench->pulses(), 11);

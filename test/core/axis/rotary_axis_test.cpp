@@ -158,7 +158,7 @@ TEST(RotaryAxis, ContinuousFollowsATrajectoryFromTheNearestTurn) {
     Bench bench({continuous(20000.0)});
     bench.axis().setPosition(each.stands);
     const double stood = bench.axis().state().position;
-    std::vector<axis::TrajectoryPoint> points;
+    std::vector<motion::TrajectoryPoint> points;
     double time = 0.0;
     for (const double position : each.points) {
       points.push_back({time += 10.0, {position}, {0.0}, {}});

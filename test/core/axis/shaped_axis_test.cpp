@@ -294,7 +294,7 @@ TEST(ShapedAxis, AHomingFindsTheSwitchAsExactly) {
 
 TEST(ShapedAxis, ALineOfAxesWithTheSameShaperStaysStraight) {
   Bench bench({shaped("x"), shaped("y")});
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.03, 0.02};
   const auto move = bench.machine->moveLine(line);
@@ -335,10 +335,10 @@ TEST(ShapedAxis, AxesThatShareMotorsAreShapedOneByOne) {
 // ---- several axes, streams ----
 
 using machine::CoordinatedMove;
-using machine::PathRequest;
-using machine::PathSegment;
 using machine::SetpointMode;
-using machine::TrajectoryRequest;
+using motion::PathRequest;
+using motion::PathSegment;
+using motion::TrajectoryRequest;
 using Together = std::function<CoordinatedMove(machine::Machine&)>;
 
 std::vector<Together> motionsOfTwoAxes() {

@@ -20,9 +20,9 @@ namespace stepdriver {
 namespace {
 
 using motion::Continuity;
-using motion::Contour;
-using motion::ContourPoint;
-using motion::ContourSegment;
+using motion::CurveSegment;
+using motion::Path;
+using motion::PathPoint;
 using test::kPi;
 using test::lineTo;
 
@@ -32,13 +32,13 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum);
 }
 
-// The direction and the curvature of a contour at a place.
+// The direction and the curvature of a path at a place.
 struct Shape {
   std::vector<double> direction;
   std::vector<double> curvature;
 };
 
-Shape shapeOf(const ContourPoint& point) {
+Shape shapeOf(const PathPoint& point) {
   const double rate = distance(point.first, std::vector<double>(point.first.size()));
   double along = 0.0;
   for (std::size_t i = 0; i < point.first.size(); ++i) along += point.first[i] * point.second[i];
@@ -51,34 +51,33 @@ Shape shapeOf(const ContourPoint& point) {
   return shape;
 }
 
-TEST(Contour, RoundsACornerByTheTolerance) {
-  const Contour contour({0.0, 0.0}, {lineTo({100.0, 0.0}, 2.0), lineTo({100.0, 100.0}, 0.0)}, 1.0);
+TEST(Path, RoundsACornerByTheTolerance) {
+  const Path path({0.0, 0.0}, {lineTo({100.0, 0.0}, 2.0), lineTo({100.0, 100.0}, 0.0)}, 1.0);
   // d = tolerance / (3/8 sin 45)
   const double d = 2.0 / (0.375 * std::sin(kPi / 4.0));
-  EXPECT_NEAR(contour.roundedFrom(0), 1.0 - d / 100.0, 1e-12);
-  EXPECT_NEAR(contour.roundedUntil(1), d / 100.0, 1e-12);
-  EXPECT_FALSE(contour.stopsAfter(0));
-  ContourPoint middle;
-  contour.evaluate(0, 1.0, middle);
+  EXPECT_NEAR(path.roundedFrom(0), 1.0 - d / 100.0, 1e-12);
+  EXPECT_NEAR(path.roundedUntil(1), d / 100.0, 1e-12);
+  EXPECT_FALSE(path.stopsAfter(0));
+  PathPoint middle;
+  path.evaluate(0, 1.0, middle);
   EXPECT_NEAR(distance(middle.position, {100.0, 0.0}), 2.0, 1e-12);
   EXPECT_NEAR(middle.position[0] - 100.0, -middle.position[1], 1e-12);
 }
 
-TEST(Contour, RoundsAtMostHalfOfASegment) {
-  const Contour contour(
-      {0.0, 0.0}, {lineTo({10.0, 0.0}, 50.0), lineTo({10.0, 6.0}, 50.0), lineTo({20.0, 6.0}, 0.0)},
-      1.0);
-  EXPECT_NEAR(contour.roundedUntil(1), 0.5, 1e-12);
-  EXPECT_NEAR(contour.roundedFrom(1), 0.5, 1e-12);
-  EXPECT_NEAR(contour.roundedFrom(0), 0.7, 1e-12);
+TEST(Path, RoundsAtMostHalfOfASegment) {
+  const Path path({0.0, 0.0},
+                  {lineTo({10.0, 0.0}, 50.0), lineTo({10.0, 6.0}, 50.0), lineTo({20.0, 6.0}, 0.0)},
+                  1.0);
+  EXPECT_NEAR(path.roundedUntil(1), 0.5, 1e-12);
+  EXPECT_NEAR(path.roundedFrom(1), 0.5, 1e-12);
+  EXPECT_NEAR(path.roundedFrom(0), 0.7, 1e-12);
 }
 
-TEST(Contour, StopsWithoutToleranceAndAtATurn) {
+TEST(Path, StopsWithoutToleranceAndAtATurn) {
   const double turn = 171.0 / 180.0 * kPi;
   const std::vector<double> back{10.0 + 10.0 * std::cos(turn), 10.0 * std::sin(turn)};
   const auto stops = [](const std::vector<double>& end, double tolerance) {
-    return Contour({0.0, 0.0}, {lineTo({10.0, 0.0}, tolerance), lineTo(end, 0.0)}, 1.0)
-        .stopsAfter(0);
+    return Path({0.0, 0.0}, {lineTo({10.0, 0.0}, tolerance), lineTo(end, 0.0)}, 1.0).stopsAfter(0);
   };
   EXPECT_TRUE(stops({10.0, 10.0}, 0.0));
   EXPECT_FALSE(stops({10.0, 10.0}, 0.1));
@@ -87,52 +86,52 @@ TEST(Contour, StopsWithoutToleranceAndAtATurn) {
   EXPECT_FALSE(stops({20.0, 0.0}, 0.0)) << "a straight line has no corner";
 }
 
-TEST(Contour, PassesATangentArcUnchanged) {
-  ContourSegment arc;
-  arc.shape = ContourSegment::Shape::kArc;
+TEST(Path, PassesATangentArcUnchanged) {
+  CurveSegment arc;
+  arc.shape = CurveSegment::Shape::kArc;
   arc.plane = {0, 1};
   arc.centre = {10.0, 5.0};
   arc.angle = kPi / 2.0;
   arc.end = {15.0, 5.0, 7.0};
-  const Contour contour({0.0, 0.0, 0.0}, {lineTo({10.0, 0.0, 0.0}, 1.0), arc}, 1.0);
+  const Path path({0.0, 0.0, 0.0}, {lineTo({10.0, 0.0, 0.0}, 1.0), arc}, 1.0);
   // The third axis begins to move with the arc: a corner.
-  EXPECT_LT(contour.roundedFrom(0), 1.0);
+  EXPECT_LT(path.roundedFrom(0), 1.0);
   arc.end[2] = 0.0;
-  const Contour flat({0.0, 0.0, 0.0}, {lineTo({10.0, 0.0, 0.0}, 1.0), arc}, 1.0);
+  const Path flat({0.0, 0.0, 0.0}, {lineTo({10.0, 0.0, 0.0}, 1.0), arc}, 1.0);
   EXPECT_EQ(flat.roundedFrom(0), 1.0);
   EXPECT_FALSE(flat.stopsAfter(0));
-  ContourPoint point;
+  PathPoint point;
   flat.evaluate(1, 1.0, point);
   EXPECT_NEAR(distance(point.position, arc.end), 0.0, 1e-12);
   EXPECT_NEAR(point.first[1], 5.0 * kPi / 2.0, 1e-12);
 }
 
-TEST(Contour, RoundsAJumpOfTheCurvatureIfItHasToBeContinuous) {
-  ContourSegment arc;
-  arc.shape = ContourSegment::Shape::kArc;
+TEST(Path, RoundsAJumpOfTheCurvatureIfItHasToBeContinuous) {
+  CurveSegment arc;
+  arc.shape = CurveSegment::Shape::kArc;
   arc.plane = {0, 1};
   arc.centre = {10.0, 5.0};
   arc.angle = kPi / 2.0;
   arc.end = {15.0, 5.0};
-  const auto contour = [&](double tolerance) {
-    return Contour({0.0, 0.0}, {lineTo({10.0, 0.0}, tolerance), arc}, 1.0, Continuity::kCurvature);
+  const auto path = [&](double tolerance) {
+    return Path({0.0, 0.0}, {lineTo({10.0, 0.0}, tolerance), arc}, 1.0, Continuity::kCurvature);
   };
   // 0.0108 d^2/5 = tolerance
-  EXPECT_NEAR(contour(1e-3).roundedFrom(0), 1.0 - std::sqrt(1e-3 * 5.0 / 0.0108) / 10.0, 1e-9);
-  EXPECT_NEAR(contour(1.0).roundedFrom(0), 1.0 - 1.25 / 10.0, 1e-12) << "a quarter of the radius";
-  EXPECT_FALSE(contour(1e-3).stopsAfter(0));
-  EXPECT_TRUE(contour(0.0).stopsAfter(0));
-  const Contour straight({0.0, 0.0}, {lineTo({10.0, 0.0}, 0.0), lineTo({20.0, 0.0}, 0.0)}, 1.0,
-                         Continuity::kCurvature);
+  EXPECT_NEAR(path(1e-3).roundedFrom(0), 1.0 - std::sqrt(1e-3 * 5.0 / 0.0108) / 10.0, 1e-9);
+  EXPECT_NEAR(path(1.0).roundedFrom(0), 1.0 - 1.25 / 10.0, 1e-12) << "a quarter of the radius";
+  EXPECT_FALSE(path(1e-3).stopsAfter(0));
+  EXPECT_TRUE(path(0.0).stopsAfter(0));
+  const Path straight({0.0, 0.0}, {lineTo({10.0, 0.0}, 0.0), lineTo({20.0, 0.0}, 0.0)}, 1.0,
+                      Continuity::kCurvature);
   EXPECT_FALSE(straight.stopsAfter(0));
 }
 
 // Lines of very different lengths that turn a little at each corner, and some not at all.
-std::vector<ContourSegment> gentleLines(std::mt19937& random) {
+std::vector<CurveSegment> overlappingLines(std::mt19937& random) {
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
-  std::vector<ContourSegment> lines;
+  std::vector<CurveSegment> lines;
   std::vector<double> end{0.0, 0.0, 0.0};
   double direction = 0.0;
   for (int i = 0; i < 60; ++i) {
@@ -147,25 +146,25 @@ std::vector<ContourSegment> gentleLines(std::mt19937& random) {
 }
 
 // What gentle lines must keep: the deviation, continuity, and a derivative that isn't small.
-void expectGentle(const Contour& contour, const std::vector<ContourSegment>& lines, int* overlaps) {
-  ContourPoint point;
-  ContourPoint given;
-  contour.evaluate(0, 0.0, point);
-  ASSERT_LT(distance(point.position, contour.start()), 1e-12);
-  for (std::size_t segment = 0; segment < contour.size(); ++segment) {
-    const double first = contour.roundedUntil(segment);
-    const double last = contour.roundedFrom(segment);
+void expectGentle(const Path& path, const std::vector<CurveSegment>& lines, int* overlaps) {
+  PathPoint point;
+  PathPoint given;
+  path.evaluate(0, 0.0, point);
+  ASSERT_LT(distance(point.position, path.start()), 1e-12);
+  for (std::size_t segment = 0; segment < path.size(); ++segment) {
+    const double first = path.roundedUntil(segment);
+    const double last = path.roundedFrom(segment);
     ASSERT_LE(first, last);
     *overlaps += first == last ? 1 : 0;
     const double before = segment == 0 ? 0.0 : lines[segment - 1].tolerance;
     // A corner without a turn has no rounding of its own: its neighbours' count.
     double most = std::max(before, lines[segment].tolerance);
     if (segment > 1) most = std::max(most, lines[segment - 2].tolerance);
-    if (segment + 1 < contour.size()) most = std::max(most, lines[segment + 1].tolerance);
+    if (segment + 1 < path.size()) most = std::max(most, lines[segment + 1].tolerance);
     for (int k = 0; k <= 100; ++k) {
       const double u = k / 100.0;
-      contour.evaluate(segment, u, point);
-      contour.evaluateGiven(segment, u, given);
+      path.evaluate(segment, u, point);
+      path.evaluateGiven(segment, u, given);
       ASSERT_LE(distance(point.position, given.position), most * (1.0 + 1e-9) + 1e-9)
           << "segment " << segment << " at " << u;
       const std::vector<double> zero(3);
@@ -174,11 +173,11 @@ void expectGentle(const Contour& contour, const std::vector<ContourSegment>& lin
         ASSERT_LT(distance(point.position, given.position), 1e-12);
       }
     }
-    if (segment + 1 == contour.size()) continue;
+    if (segment + 1 == path.size()) continue;
     const Shape in = shapeOf(point);
-    contour.evaluate(segment + 1, 0.0, given);
+    path.evaluate(segment + 1, 0.0, given);
     ASSERT_LT(distance(point.position, given.position), 1e-9);
-    if (contour.stopsAfter(segment)) {
+    if (path.stopsAfter(segment)) {
       ASSERT_LT(distance(point.position, lines[segment].end), 1e-9);
       continue;
     }
@@ -188,33 +187,32 @@ void expectGentle(const Contour& contour, const std::vector<ContourSegment>& lin
   }
 }
 
-TEST(Contour, OverlapsTheRoundingsOfShortLines) {
+TEST(Path, OverlapsTheRoundingsOfShortLines) {
   std::mt19937 random(11);
   int overlaps = 0;
   for (int i = 0; i < 100; ++i) {
     SCOPED_TRACE("path " + std::to_string(i));
-    const std::vector<ContourSegment> lines = gentleLines(random);
-    const Contour contour({0.0, 0.0, 0.0}, lines, 1.0, Continuity::kCurvature);
-    ASSERT_NO_FATAL_FAILURE(expectGentle(contour, lines, &overlaps));
+    const std::vector<CurveSegment> lines = overlappingLines(random);
+    const Path path({0.0, 0.0, 0.0}, lines, 1.0, Continuity::kCurvature);
+    ASSERT_NO_FATAL_FAILURE(expectGentle(path, lines, &overlaps));
   }
   EXPECT_GT(overlaps, 2000);
 }
 
-// A contour that continues: what was rounded up to a place on it stays as it is, and the other
+// A path that continues: what was rounded up to a place on it stays as it is, and the other
 // corners are rounded again, together with those of the added lines.
-TEST(Contour, KeepsTheRoundingsThatHaveBegun) {
+TEST(Path, KeepsTheRoundingsThatHaveBegun) {
   std::mt19937 random(12);
   int overlaps = 0;
   int widened = 0;
   for (int i = 0; i < 100; ++i) {
     SCOPED_TRACE("path " + std::to_string(i));
-    std::vector<ContourSegment> lines = gentleLines(random);
+    std::vector<CurveSegment> lines = overlappingLines(random);
     const std::size_t count =
         std::uniform_int_distribution<std::size_t>(2, lines.size() - 1)(random);
     const std::vector<double> start(3);
-    const Contour shorter(start,
-                          {lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(count)}, 1.0,
-                          Continuity::kCurvature, true);
+    const Path shorter(start, {lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(count)},
+                       1.0, Continuity::kCurvature, true);
     const std::size_t at = std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
     const double parameter = std::uniform_real_distribution<double>(0.0, 1.0)(random);
     double away = 0.0;
@@ -224,9 +222,9 @@ TEST(Contour, KeepsTheRoundingsThatHaveBegun) {
       if (k < at || shorter.blendAfter(k) > away) lines[k].blend = shorter.blendAfter(k);
     }
     lines[at].kept = parameter;
-    const Contour longer(start, lines, 1.0, Continuity::kCurvature);
-    ContourPoint before;
-    ContourPoint after;
+    const Path longer(start, lines, 1.0, Continuity::kCurvature);
+    PathPoint before;
+    PathPoint after;
     for (std::size_t segment = 0; segment <= at; ++segment) {
       for (int k = 0; k <= 20; ++k) {
         const double u = k / 20.0 * (segment == at ? parameter : 1.0);
@@ -244,7 +242,7 @@ TEST(Contour, KeepsTheRoundingsThatHaveBegun) {
   EXPECT_GT(widened, 20);
 }
 
-TEST(Contour, FindsTheCircleOfAnArc) {
+TEST(Path, FindsTheCircleOfAnArc) {
   const motion::Arc arc = motion::arcThrough({1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0});
   EXPECT_NEAR(arc.centre[0], 0.0, 1e-12);
   EXPECT_NEAR(arc.centre[1], 0.0, 1e-12);
@@ -257,48 +255,48 @@ TEST(Contour, FindsTheCircleOfAnArc) {
 }
 
 // 1000 and 1001 from the centre: the radius changes evenly, and so does the angle.
-TEST(Contour, OfAnArcWhoseEndsAreNotEquallyFarHasARadiusThatChangesEvenly) {
-  ContourSegment segment = lineTo({-1001.0, 0.0}, 0.0);
-  segment.shape = ContourSegment::Shape::kArc;
+TEST(Path, OfAnArcWhoseEndsAreNotEquallyFarHasARadiusThatChangesEvenly) {
+  CurveSegment segment = lineTo({-1001.0, 0.0}, 0.0);
+  segment.shape = CurveSegment::Shape::kArc;
   segment.plane = {0, 1};
   segment.angle = motion::arcAround({1000.0, 0.0}, {0.0, 0.0}, {-1001.0, 0.0}, false).angle;
   EXPECT_NEAR(segment.angle, kPi, 1e-12);
-  const Contour contour({1000.0, 0.0}, {segment}, 1.0);
-  ContourPoint before;
-  ContourPoint point;
-  ContourPoint after;
+  const Path path({1000.0, 0.0}, {segment}, 1.0);
+  PathPoint before;
+  PathPoint point;
+  PathPoint after;
   double most = 0.0;
   for (int i = 0; i <= 1000; ++i) {
     const double u = i / 1000.0;
-    contour.evaluate(0, u, point);
+    path.evaluate(0, u, point);
     EXPECT_NEAR(std::hypot(point.position[0], point.position[1]), 1000.0 + u, 1e-9);
     most = std::max(most, point.position[1]);
     constexpr double kStep = 1e-4;
-    contour.evaluate(0, u - kStep, before);
-    contour.evaluate(0, u + kStep, after);
+    path.evaluate(0, u - kStep, before);
+    path.evaluate(0, u + kStep, after);
     for (std::size_t k = 0; k < 2; ++k) {
       EXPECT_NEAR(point.first[k], (after.position[k] - before.position[k]) / (2.0 * kStep), 1e-3);
       EXPECT_NEAR(point.second[k], (after.first[k] - before.first[k]) / (2.0 * kStep), 1e-3);
     }
   }
-  EXPECT_NEAR(contour.range(0, 1).second, most, 1e-2);
-  EXPECT_GE(contour.range(0, 1).second, most);
-  EXPECT_NEAR(contour.range(0, 0).first, -1001.0, 1e-9);
+  EXPECT_NEAR(path.range(0, 1).second, most, 1e-2);
+  EXPECT_GE(path.range(0, 1).second, most);
+  EXPECT_NEAR(path.range(0, 0).first, -1001.0, 1e-9);
 }
 
-TEST(Contour, RefusesACusp) {
-  ContourSegment bezier;
-  bezier.shape = ContourSegment::Shape::kBezier;
+TEST(Path, RefusesACusp) {
+  CurveSegment bezier;
+  bezier.shape = CurveSegment::Shape::kBezier;
   bezier.end = {10.0, 0.0};
   bezier.control1 = {10.0, 10.0};
   bezier.control2 = {0.0, 10.0};
-  EXPECT_THROW(Contour({0.0, 0.0}, {bezier}, 1.0), motion::Malformed);
+  EXPECT_THROW(Path({0.0, 0.0}, {bezier}, 1.0), motion::Malformed);
   bezier.control1 = {9.0, 10.0};
-  EXPECT_NO_THROW(Contour({0.0, 0.0}, {bezier}, 1.0));
+  EXPECT_NO_THROW(Path({0.0, 0.0}, {bezier}, 1.0));
 }
 
 // As many drawings have: the curve is as given, and has a direction everywhere.
-TEST(Contour, TakesABezierWithAControlPointAtItsEnd) {
+TEST(Path, TakesABezierWithAControlPointAtItsEnd) {
   std::mt19937 random(12);
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -309,17 +307,17 @@ TEST(Contour, TakesABezierWithAControlPointAtItsEnd) {
       return std::vector<double>{number(-size, size), number(-size, size), number(-size, size)};
     };
     const std::vector<double> start = place();
-    ContourSegment bezier;
-    bezier.shape = ContourSegment::Shape::kBezier;
+    CurveSegment bezier;
+    bezier.shape = CurveSegment::Shape::kBezier;
     bezier.end = place();
     bezier.control1 = i % 3 == 1 ? place() : start;
     bezier.control2 = i % 3 == 0 ? place() : bezier.end;
     if (i % 7 == 0) bezier.control2 = start;
-    const Contour contour(start, {bezier}, 1.0);
-    ContourPoint point;
+    const Path path(start, {bezier}, 1.0);
+    PathPoint point;
     for (int k = 0; k <= 100; ++k) {
       const double u = k / 100.0;
-      contour.evaluate(0, u, point);
+      path.evaluate(0, u, point);
       ASSERT_GT(distance(point.first, {0.0, 0.0, 0.0}), 0.1) << i << " at " << u;
       if (i % 3 == 2) continue;  // a straight line has another parameter
       double square = 0.0;
@@ -335,18 +333,18 @@ TEST(Contour, TakesABezierWithAControlPointAtItsEnd) {
   }
 }
 
-TEST(Contour, KnowsTheRangeOfEachAxis) {
+TEST(Path, KnowsTheRangeOfEachAxis) {
   std::mt19937 random(7);
   for (int i = 0; i < 200; ++i) {
-    const Contour contour = test::randomContour(random).contour();
-    ContourPoint point;
-    for (std::size_t segment = 0; segment < contour.size(); ++segment) {
-      for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
-        const auto [low, high] = contour.range(segment, axis);
+    const Path path = test::randomPath(random).path();
+    PathPoint point;
+    for (std::size_t segment = 0; segment < path.size(); ++segment) {
+      for (std::size_t axis = 0; axis < path.axes(); ++axis) {
+        const auto [low, high] = path.range(segment, axis);
         double lowest = high;
         double highest = low;
         for (int k = 0; k <= 2000; ++k) {
-          contour.evaluateGiven(segment, k / 2000.0, point);
+          path.evaluateGiven(segment, k / 2000.0, point);
           lowest = std::min(lowest, point.position[axis]);
           highest = std::max(highest, point.position[axis]);
         }
@@ -365,43 +363,43 @@ void expectRounded(Continuity continuity) {
   std::mt19937 random(20);
   int corners = 0;
   for (int i = 0; i < 400; ++i) {
-    const test::RandomContour path = test::randomContour(random);
-    const Contour contour = path.contour(continuity);
-    ContourPoint point;
-    ContourPoint given;
+    const test::RandomPath given_path = test::randomPath(random);
+    const Path path = given_path.path(continuity);
+    PathPoint point;
+    PathPoint given;
     const auto shape_at = [&](std::size_t segment, double parameter) {
-      contour.evaluate(segment, parameter, point);
+      path.evaluate(segment, parameter, point);
       return shapeOf(point);
     };
-    for (std::size_t segment = 0; segment < contour.size(); ++segment) {
-      const double first = contour.roundedUntil(segment);
-      const double last = contour.roundedFrom(segment);
+    for (std::size_t segment = 0; segment < path.size(); ++segment) {
+      const double first = path.roundedUntil(segment);
+      const double last = path.roundedFrom(segment);
       ASSERT_LE(first, last);
-      const double before = segment == 0 ? 0.0 : path.segments[segment - 1].tolerance;
+      const double before = segment == 0 ? 0.0 : given_path.segments[segment - 1].tolerance;
       for (int k = 0; k <= 1000; ++k) {
         const double u = k / 1000.0;
-        contour.evaluate(segment, u, point);
-        contour.evaluateGiven(segment, u, given);
-        const double after = path.segments[segment].tolerance;
+        path.evaluate(segment, u, point);
+        path.evaluateGiven(segment, u, given);
+        const double after = given_path.segments[segment].tolerance;
         // Roundings that overlap reach beyond half of a line.
         const double most = std::max(before, after);
         ASSERT_LE(distance(point.position, given.position), most * (1.0 + 1e-9) + 1e-9)
             << "path " << i << " segment " << segment << " at " << u;
-        ASSERT_GT(distance(point.first, std::vector<double>(contour.axes())), 0.0);
+        ASSERT_GT(distance(point.first, std::vector<double>(path.axes())), 0.0);
       }
-      if (segment + 1 == contour.size() || contour.stopsAfter(segment)) continue;
+      if (segment + 1 == path.size() || path.stopsAfter(segment)) continue;
       ASSERT_LT(distance(shape_at(segment, 1.0).direction, shape_at(segment + 1, 0.0).direction),
                 1.1e-6)
           << "path " << i << " segment " << segment;
       if (continuity == Continuity::kCurvature) {
         const std::vector<double> in = shape_at(segment, 1.0).curvature;
         const std::vector<double> out = shape_at(segment + 1, 0.0).curvature;
-        const double zero = distance(in, std::vector<double>(contour.axes()));
+        const double zero = distance(in, std::vector<double>(path.axes()));
         ASSERT_LT(distance(in, out), 1e-5 * zero + 1e-12) << "path " << i << " segment " << segment;
       }
       if (last == 1.0) continue;
       ++corners;
-      const double scale = distance(point.first, std::vector<double>(contour.axes()));
+      const double scale = distance(point.first, std::vector<double>(path.axes()));
       for (const double edge : {first, last}) {
         if (edge < 1e-6 || edge > 1.0 - 1e-6) continue;
         struct Change {
@@ -412,7 +410,7 @@ void expectRounded(Continuity continuity) {
         const auto change = [&](double away) {
           const Shape in = shape_at(segment, edge - away);
           const Shape out = shape_at(segment, edge + away);
-          const double size = distance(in.curvature, std::vector<double>(contour.axes()));
+          const double size = distance(in.curvature, std::vector<double>(path.axes()));
           return Change{distance(in.direction, out.direction),
                         distance(in.curvature, out.curvature) * scale, 1e-6 * size * scale};
         };
@@ -429,9 +427,9 @@ void expectRounded(Continuity continuity) {
   EXPECT_GT(corners, 500);
 }
 
-TEST(Contour, StaysWithinTheToleranceOnRandomPaths) { expectRounded(Continuity::kDirection); }
+TEST(Path, StaysWithinTheToleranceOnRandomPaths) { expectRounded(Continuity::kDirection); }
 
-TEST(Contour, StaysWithinTheToleranceWithAContinuousCurvature) {
+TEST(Path, StaysWithinTheToleranceWithAContinuousCurvature) {
   expectRounded(Continuity::kCurvature);
 }
 

@@ -200,7 +200,7 @@ TEST_F(CoreXyMotion, AlongALine) {
 }
 
 TEST_F(CoreXyMotion, AlongATrajectory) {
-  machine::TrajectoryRequest request;
+  motion::TrajectoryRequest request;
   request.names = {"x", "y"};
   request.points.resize(2);
   request.points[0].time = 0.5;

@@ -91,10 +91,10 @@ class Client {
     }
   }
 
-  machine::TrajectoryRequest trajectory() {
-    machine::TrajectoryRequest request{{"x", name() == "y" ? "y" : "z"}, {}};
+  motion::TrajectoryRequest trajectory() {
+    motion::TrajectoryRequest request{{"x", name() == "y" ? "y" : "z"}, {}};
     for (const double part : {0.6, 1.0}) {
-      axis::TrajectoryPoint& point = request.points.emplace_back();
+      motion::TrajectoryPoint& point = request.points.emplace_back();
       point.time = 0.3 * part;
       point.positions = {0.004 * part, -0.003 * part};
       point.velocities = {part < 1.0 ? 0.02 : 0.0, part < 1.0 ? -0.015 : 0.0};

@@ -16,8 +16,8 @@
 namespace stepdriver {
 namespace {
 
-using machine::PathRequest;
-using machine::PathSegment;
+using motion::PathRequest;
+using motion::PathSegment;
 
 class DemoTraces : public test::TrajectoryBench {
  protected:

@@ -98,7 +98,7 @@ TEST_F(EmergencyRamp, DeceleratesAndTakesTheCurrentInTheOrderBrakeAndCurrent) {
 
 TEST_F(EmergencyRamp, SlowsALineDownAlongItsPath) {
   begin();
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.06, 0.03};
   const machine::CoordinatedMove move = bench->machine->moveLine(line);

@@ -133,7 +133,7 @@ TEST_F(FlightRecorderTest, HasEveryEdgeOfALineAHomingAndAnEmergencyStop) {
   x.homing->max_travel = 0.3;
   Bench& bench = start({x, linearAxis("y")});
   bench.machine->home({"x"});
-  machine::LineRequest line;
+  motion::LineRequest line;
   line.names = {"x", "y"};
   line.positions = {0.02, 0.03};
   line.relative = true;

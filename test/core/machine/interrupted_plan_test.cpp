@@ -88,14 +88,14 @@ TEST_F(InterruptedPlan, OfAnAppendIsAnsweredAtOnce) {
     first.more_follows = true;
     const test::CoordinatedMove move = followPath(first);
     advance(0.1);
-    const machine::PathAppend append{move.id(), longPath().segments, true};
+    const motion::PathAppend append{move.id(), longPath().segments, true};
     EXPECT_LE(looksAfter(ending, [&] { machine().appendPath(append); }), 1U);
     EXPECT_NE(machine().wait(move).end, axis::MoveEnd::kReached);
   }
 }
 
 TEST_F(InterruptedPlan, OfATrajectoryIsAnsweredAtOnce) {
-  machine::TrajectoryRequest request{{"x", "y"}, {}};
+  motion::TrajectoryRequest request{{"x", "y"}, {}};
   for (int i = 0; i < 30'000; ++i) {
     const double time = 0.02 * i;
     request.points.push_back({time, {0.02 * std::sin(time), 0.02 * std::sin(2.0 * time)}, {}, {}});

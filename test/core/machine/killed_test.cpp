@@ -160,11 +160,11 @@ TEST_F(Killed, AtAnyInstantOfALineSaysFromWhereEachAxisMoved) {
 }
 
 TEST_F(Killed, AtAnyInstantOfATrajectorySaysFromWhereEachAxisMoved) {
-  machine::TrajectoryRequest request;
+  motion::TrajectoryRequest request;
   request.names = {"x", "y"};
   for (const auto& [time, place] :
        std::vector<std::pair<double, double>>{{0.4, 0.020}, {0.8, 0.004}}) {
-    axis::TrajectoryPoint point;
+    motion::TrajectoryPoint point;
     point.time = time;
     point.positions = {place, place};
     point.velocities = {0.0, 0.0};

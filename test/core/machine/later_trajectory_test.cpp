@@ -20,12 +20,12 @@ using axis::MoveEnd;
 using machine::CoordinatedMove;
 using machine::CoordinatedResult;
 using machine::SetpointMode;
-using machine::TrajectoryRequest;
+using motion::TrajectoryRequest;
 using test::refusal;
 using test::trajectoryAxis;
 
 TrajectoryRequest later(double begin_in, const std::vector<std::string>& names,
-                        const std::vector<axis::TrajectoryPoint>& points) {
+                        const std::vector<motion::TrajectoryPoint>& points) {
   TrajectoryRequest request{names, points};
   request.begin_in = begin_in;
   return request;

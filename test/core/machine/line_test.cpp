@@ -55,7 +55,7 @@ class Line : public testing::Test {
   }
 
   machine::Machine& machine() { return *bench->machine; }
-  CoordinatedMove start(const machine::LineRequest& request) { return machine().moveLine(request); }
+  CoordinatedMove start(const motion::LineRequest& request) { return machine().moveLine(request); }
   double position(const std::string& name) { return bench->axis(name).state().position; }
   void advance(double seconds) { machine().advance(seconds); }
   void awaitRest() {
@@ -343,7 +343,7 @@ TEST_F(Line, ReachesTargetsInTheMiddleOfTwoMicrosteps) {
     const std::string what = "to " + std::to_string(target);
     expect_reached(start({{"x", "y"}, {target, 2.0 * target}}), "a line " + what);
     expect_reached(start({{"x", "y"}, {0.002, -0.004}, true}), "a relative line after " + what);
-    machine::PathSegment segment;
+    motion::PathSegment segment;
     segment.end = {target, 2.0 * target};
     expect_reached(machine().followPath({{"x", "y"}, {segment}}), "a path " + what);
     expect_reached(machine().followTrajectory({{"x", "y"}, {{0.9, {0.01, 0.01}, {}, {}}}}),
@@ -367,9 +367,9 @@ TEST_F(Line, RefusesAVelocityWithoutAStepInAQuarterOfAnHour) {
     EXPECT_REFUSED(bench->axis("x").moveTo(1.0, false, velocity), "is below the lowest, 1e-06 m/s");
     EXPECT_REFUSED(bench->axis("x").plan(1.0, false, velocity), "is below the lowest, 1e-06 m/s");
     EXPECT_REFUSED(bench->axis("x").moveRounds(1.0, velocity), "is below the lowest, 1e-06 m/s");
-    machine::PathSegment segment;
+    motion::PathSegment segment;
     segment.end = {1.0, 0.0};
-    machine::PathRequest path{{"x", "y"}, {segment}, false, velocity};
+    motion::PathRequest path{{"x", "y"}, {segment}, false, velocity};
     const std::string why = "m/s, but it must be 0, or at least 1e-06 m/s, which is 0.001 steps/s";
     EXPECT_REFUSED(machine().followPath(path), "segment 0 of the path has the velocity");
     EXPECT_REFUSED(machine().followPath(path), why);
@@ -477,7 +477,7 @@ TEST_F(Line, RelativeToAJogWithoutAnEndIsRefused) {
 }
 
 TEST_F(Line, RefusesWhatItCannotDoAndMovesNothing) {
-  const auto refused = [&](const machine::LineRequest& request) {
+  const auto refused = [&](const motion::LineRequest& request) {
     return refusal([&] { start(request); });
   };
   EXPECT_EQ(refused({{}, {}}), "no axis is named (axes: x, y, c)");

@@ -216,10 +216,10 @@ TEST_F(MotionPictures, LineWithHold) {
 }
 
 /// Two points. With accelerations the segments are quintics, without them cubics.
-machine::TrajectoryRequest points(bool with_accelerations) {
-  machine::TrajectoryRequest request{{"x"}, {{1.0, {0.4}, {0.6}, {}}, {2.0, {0.8}, {0.0}, {}}}};
+motion::TrajectoryRequest points(bool with_accelerations) {
+  motion::TrajectoryRequest request{{"x"}, {{1.0, {0.4}, {0.6}, {}}, {2.0, {0.8}, {0.0}, {}}}};
   if (with_accelerations) {
-    for (axis::TrajectoryPoint& point : request.points) point.accelerations = {0.0};
+    for (motion::TrajectoryPoint& point : request.points) point.accelerations = {0.0};
   }
   return request;
 }

@@ -27,8 +27,8 @@
 namespace stepdriver {
 namespace {
 
-using machine::PathRequest;
-using machine::PathSegment;
+using motion::PathRequest;
+using motion::PathSegment;
 using test::AxisSteps;
 using test::PlannedPath;
 
@@ -38,7 +38,7 @@ using Point = std::array<double, 2>;
 struct Drawn {
   PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0};
   std::vector<PathSegment> appended;
-  std::vector<axis::PathAxis> axes;
+  std::vector<motion::PathAxis> axes;
   std::string text;
 };
 
@@ -132,22 +132,22 @@ double distanceTo(const Point& point, const Point& a, const Point& b) {
 class Hull {
  public:
   explicit Hull(const Drawn& drawn) {
-    machine::PathFrame frame{
+    motion::PathFrame frame{
         drawn.request.names, {0.0, 0.0}, drawn.request.velocity, drawn.request.tolerance};
-    machine::PathReader reader(frame, drawn.axes, {0.0, 0.0});
-    std::vector<motion::ContourSegment> segments;
+    motion::PathReader reader(frame, drawn.axes, {0.0, 0.0});
+    std::vector<motion::CurveSegment> segments;
     for (const PathSegment& segment : drawn.request.segments) reader.read(segment, segments);
     for (const PathSegment& segment : drawn.appended) reader.read(segment, segments);
     if (segments.empty()) return;
-    const motion::Contour contour({0.0, 0.0}, segments, 1.0);
-    motion::ContourPoint point;
+    const motion::Path path({0.0, 0.0}, segments, 1.0);
+    motion::PathPoint point;
     for (std::size_t i = 0; i < segments.size(); ++i) {
-      const int parts = contour.isLine(i) ? 1 : 200;
+      const int parts = path.isLine(i) ? 1 : 200;
       for (int k = 0; k < parts; ++k) {
         Stretch& stretch = stretches_.emplace_back();
-        contour.evaluateGiven(i, static_cast<double>(k) / parts, point);
+        path.evaluateGiven(i, static_cast<double>(k) / parts, point);
         stretch.from = {point.position[0], point.position[1]};
-        contour.evaluateGiven(i, (k + 1.0) / parts, point);
+        path.evaluateGiven(i, (k + 1.0) / parts, point);
         stretch.to = {point.position[0], point.position[1]};
         stretch.speed = segments[i].speed;
       }
@@ -188,7 +188,7 @@ constexpr double kMostOver = 1.05;
 constexpr double kRounding = 2e-9;  // [s] the times of two steps are rounded by this
 
 // Also of what happens in the shortest time between two knots.
-sim::MotionJudge judgeOf(const axis::PathAxis& axis) {
+sim::MotionJudge judgeOf(const motion::PathAxis& axis) {
   return sim::MotionJudge(
       {axis.limits.max_speed, std::max(axis.limits.acceleration, axis.limits.deceleration)});
 }

@@ -22,8 +22,8 @@ namespace stepdriver {
 namespace {
 
 using axis::MoveEnd;
-using machine::PathAhead;
-using machine::PathAppend;
+using motion::PathAhead;
+using motion::PathAppend;
 using test::CoordinatedMove;
 using test::CoordinatedResult;
 using test::kHalfMicrosteps;
@@ -721,7 +721,7 @@ TEST_F(PathQueue, TellsWhatLiesAhead) {
   begin(path, 5);
   PathAhead now = ahead();
   EXPECT_EQ(now.segments, 5U);
-  EXPECT_EQ(now.room, machine::kMostPathSegments - 5);
+  EXPECT_EQ(now.room, motion::kMostPathSegments - 5);
   EXPECT_NEAR(now.time, 0.51, 0.002);
   EXPECT_TRUE(now.more_follows);
   EXPECT_EQ(now.targets, (std::vector<double>{0.005, 0.0}));

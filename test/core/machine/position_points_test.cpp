@@ -19,7 +19,7 @@ namespace stepdriver {
 namespace {
 
 using axis::MoveEnd;
-using machine::TrajectoryRequest;
+using motion::TrajectoryRequest;
 using test::kNan;
 using test::kPi;
 using test::refusal;

@@ -81,8 +81,8 @@ std::vector<Call> callsOfAnAxis(double number) {
   };
 }
 
-machine::PathSegment segmentTo(double number, machine::PathSegment::Shape shape) {
-  machine::PathSegment segment;
+motion::PathSegment segmentTo(double number, motion::PathSegment::Shape shape) {
+  motion::PathSegment segment;
   segment.shape = shape;
   segment.end = {number, 0.0};
   segment.plane = {"x", "y"};
@@ -93,7 +93,7 @@ machine::PathSegment segmentTo(double number, machine::PathSegment::Shape shape)
 }
 
 std::vector<Call> callsOfAMachine(double number) {
-  using Shape = machine::PathSegment::Shape;
+  using Shape = motion::PathSegment::Shape;
   const std::string text = std::to_string(number);
   std::vector<Call> calls = {
       {"axis " + text, [=](Bench& bench) { bench.machine->axis(text); }},
@@ -164,7 +164,7 @@ std::vector<Call> callsOfAMachine(double number) {
   for (const Shape shape : {Shape::kLine, Shape::kArcAround, Shape::kArcThrough, Shape::kBezier}) {
     calls.push_back(
         {"followPath " + std::to_string(static_cast<int>(shape)) + " " + text, [=](Bench& bench) {
-           machine::PathRequest request;
+           motion::PathRequest request;
            request.names = {"x", "y"};
            request.segments = {segmentTo(number, shape)};
            request.tolerance = number;

@@ -19,8 +19,8 @@
 namespace stepdriver {
 namespace {
 
-using machine::PathRequest;
-using machine::PathSegment;
+using motion::PathRequest;
+using motion::PathSegment;
 using test::kPi;
 using test::pathAxis;
 using test::planned;
@@ -50,7 +50,7 @@ PathRequest pathOf(std::vector<PathSegment> segments) {
 class ShortSegments : public testing::TestWithParam<double> {
  protected:
   PlannedPath follow(const PathRequest& request) const { return planned(request, axes()); }
-  std::vector<axis::PathAxis> axes() const {
+  std::vector<motion::PathAxis> axes() const {
     return {pathAxis("x", {kPerMetre, 0.1, 1.0, GetParam()}),
             pathAxis("y", {kPerMetre, 0.1, 1.0, GetParam()})};
   }

@@ -17,8 +17,8 @@
 namespace stepdriver {
 namespace {
 
-using machine::PathRequest;
-using machine::PathSegment;
+using motion::PathRequest;
+using motion::PathSegment;
 using test::AxisSteps;
 using test::pathAxis;
 using test::PathAxisLimits;
@@ -74,7 +74,7 @@ TEST(SlowPath, OfAHalfMillimetreMakesItsFortySteps) {
 
 TEST(SlowPath, OfARotaryAxisTurnsOnlyToItsEnd) {
   // 3200 microsteps a revolution.
-  axis::PathAxis axis = pathAxis("x", {3200.0 / (2.0 * test::kPi), 10.0, 3000.0, 1e5});
+  motion::PathAxis axis = pathAxis("x", {3200.0 / (2.0 * test::kPi), 10.0, 3000.0, 1e5});
   axis.kind = config::Kind::kRotary;
   const PlannedPath path = planned(lines({{0.5, 1e-3}}), {axis});
   const AxisSteps steps = path.steps(0);

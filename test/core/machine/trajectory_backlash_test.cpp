@@ -18,7 +18,7 @@ namespace {
 using axis::MoveEnd;
 using machine::CoordinatedMove;
 using machine::CoordinatedResult;
-using machine::TrajectoryRequest;
+using motion::TrajectoryRequest;
 using test::Crossing;
 using test::trajectoryAxis;
 

@@ -18,9 +18,9 @@ namespace stepdriver {
 namespace {
 
 using axis::MoveEnd;
-using axis::TrajectoryPoint;
 using machine::CoordinatedMove;
-using machine::TrajectoryRequest;
+using motion::TrajectoryPoint;
+using motion::TrajectoryRequest;
 using test::kSecond;
 using test::trajectoryAxis;
 

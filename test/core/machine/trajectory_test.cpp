@@ -20,7 +20,7 @@ namespace {
 using axis::MoveEnd;
 using machine::CoordinatedMove;
 using machine::CoordinatedResult;
-using machine::TrajectoryRequest;
+using motion::TrajectoryRequest;
 using test::kNan;
 using test::refusal;
 using test::trajectoryAxis;
@@ -159,7 +159,7 @@ TrajectoryRequest sampledTrapezoid(double period, double phase, bool with_accele
                                       : 2.0 * t - 0.2;
     const double v = 10.0 * std::max(0.0, std::min({t, kRamp, left}));
     const double a = left <= 0.0 ? 0.0 : t < kRamp ? 10.0 : left > kRamp ? 0.0 : -10.0;
-    axis::TrajectoryPoint point{t, {way, -way / 2.0}, {v, -v / 2.0}, {}};
+    motion::TrajectoryPoint point{t, {way, -way / 2.0}, {v, -v / 2.0}, {}};
     if (with_accelerations) point.accelerations = {a, -a / 2.0};
     request.points.push_back(point);
   };
@@ -217,7 +217,7 @@ TEST_F(Trajectory, LeavesTheRestOfAMicrostepToTheNextRelativeMove) {
 }
 
 TEST_F(Trajectory, RefusesWhatAnAxisCannotDoAndMovesNothing) {
-  const auto why = [&](const std::vector<axis::TrajectoryPoint>& points) {
+  const auto why = [&](const std::vector<motion::TrajectoryPoint>& points) {
     return refusal([&] { follow({{"x", "y"}, points}); });
   };
   EXPECT_EQ(why({}), "x: the trajectory has no points");

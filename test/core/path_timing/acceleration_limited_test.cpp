@@ -22,27 +22,27 @@
 namespace stepdriver {
 namespace {
 
-using motion::Contour;
-using motion::ContourKnot;
-using motion::ContourLimits;
-using motion::ContourPoint;
-using motion::ContourSegment;
+using motion::CurveSegment;
+using motion::Path;
+using motion::PathPoint;
 using motion::Profile;
+using motion::TimingKnot;
+using motion::TimingLimits;
 using test::kPi;
 using test::lineTo;
 
 // What the engine follows on one axis.
-Profile profileOf(const Contour& contour, const std::vector<ContourKnot>& knots, std::size_t axis) {
+Profile profileOf(const Path& path, const std::vector<TimingKnot>& knots, std::size_t axis) {
   std::vector<motion::Waypoint> waypoints;
-  for (const ContourKnot& knot : knots) {
+  for (const TimingKnot& knot : knots) {
     waypoints.push_back({knot.time_ns, knot.positions[axis], knot.velocities[axis], {}});
   }
   motion::MotionState from;
-  from.position = contour.start()[axis];
+  from.position = path.start()[axis];
   return motion::planSpline(0, from, waypoints);
 }
 
-double durationOf(const std::vector<ContourKnot>& knots) {
+double durationOf(const std::vector<TimingKnot>& knots) {
   return static_cast<double>(knots.back().time_ns) * 1e-9;
 }
 
@@ -50,15 +50,15 @@ double durationOf(const std::vector<ContourKnot>& knots) {
 // limits kept in its middle, by bisection of the speed at each place.
 class FineGrid {
  public:
-  FineGrid(const Contour& contour, const std::vector<ContourLimits>& limits)
-      : contour_(contour), limits_(limits) {
-    for (std::size_t i = 0; i < contour.size(); ++i) {
-      const double first = contour.roundedUntil(i);
-      const double last = contour.roundedFrom(i);
+  FineGrid(const Path& path, const std::vector<TimingLimits>& limits)
+      : path_(path), limits_(limits) {
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const double first = path.roundedUntil(i);
+      const double last = path.roundedFrom(i);
       addSpan(i, 0.0, first);
       addSpan(i, first, last);
       addSpan(i, last, 1.0);
-      if (contour.stopsAfter(i)) intervals_.back().stops = true;
+      if (path.stopsAfter(i)) intervals_.back().stops = true;
     }
   }
 
@@ -105,8 +105,8 @@ class FineGrid {
     if (!(to - from > 1e-9)) return;
     for (int i = 0; i < kParts; ++i) {
       const double h = (to - from) / kParts;
-      ContourPoint point;
-      contour_.evaluate(segment, from + (i + 0.5) * h, point);
+      PathPoint point;
+      path_.evaluate(segment, from + (i + 0.5) * h, point);
       Interval made;
       double square = 0.0;
       double along = 0.0;
@@ -116,7 +116,7 @@ class FineGrid {
       }
       const double rate = std::sqrt(square);
       made.length = rate * h;
-      made.cap = contour_.speed(segment) * contour_.speed(segment);
+      made.cap = path_.speed(segment) * path_.speed(segment);
       for (std::size_t j = 0; j < limits_.size(); ++j) {
         made.first.push_back(point.first[j] / rate);
         made.second.push_back((point.second[j] - point.first[j] * along / square) / square);
@@ -155,17 +155,17 @@ class FineGrid {
     return u.low <= u.high;
   }
 
-  const Contour& contour_;
-  const std::vector<ContourLimits>& limits_;
+  const Path& path_;
+  const std::vector<TimingLimits>& limits_;
   std::vector<Interval> intervals_;
 };
 
 // The points of the path as given, close to each other.
-std::vector<std::vector<double>> samplesOf(const Contour& contour, std::size_t segment) {
+std::vector<std::vector<double>> samplesOf(const Path& path, std::size_t segment) {
   std::vector<std::vector<double>> samples;
-  ContourPoint point;
+  PathPoint point;
   for (int i = 0; i <= 2000; ++i) {
-    contour.evaluateGiven(segment, i / 2000.0, point);
+    path.evaluateGiven(segment, i / 2000.0, point);
     samples.push_back(point.position);
   }
   return samples;
@@ -188,10 +188,10 @@ double distanceToLine(const std::vector<double>& point, const std::vector<double
   return std::sqrt(sum);
 }
 
-TEST(ContourMotion, OfALineIsATrapezoid) {
-  const Contour contour({0.0}, {lineTo({1000.0}, 0.0)}, 1.0);
-  const std::vector<ContourKnot> knots =
-      motion::planContour(contour, {{1000.0, 2000.0, 4000.0}}).knots;
+TEST(AccelerationLimitedTiming, OfALineIsATrapezoid) {
+  const Path path({0.0}, {lineTo({1000.0}, 0.0)}, 1.0);
+  const std::vector<TimingKnot> knots =
+      motion::planAccelerationLimited(path, {{1000.0, 2000.0, 4000.0}}).knots;
   // 1000/1000 + 1000/2/2000 + 1000/2/4000
   EXPECT_NEAR(durationOf(knots), 1.375, 1e-9);
   ASSERT_EQ(knots.size(), 4U);
@@ -199,30 +199,32 @@ TEST(ContourMotion, OfALineIsATrapezoid) {
   EXPECT_NEAR(knots[2].positions[0], 875.0, 1e-9);
 }
 
-TEST(ContourMotion, OfACircleKeepsItsSpeed) {
-  ContourSegment arc;
-  arc.shape = ContourSegment::Shape::kArc;
+TEST(AccelerationLimitedTiming, OfACircleKeepsItsSpeed) {
+  CurveSegment arc;
+  arc.shape = CurveSegment::Shape::kArc;
   arc.plane = {0, 1};
   arc.centre = {-1600.0, 0.0};
   arc.angle = 2.0 * kPi;
   arc.end = {0.0, 0.0};
   arc.speed = 8000.0;
-  const Contour contour({0.0, 0.0}, {arc}, 1.0);
-  const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0});
+  const Path path({0.0, 0.0}, {arc}, 1.0);
+  const std::vector<TimingLimits> limits(2, {8000.0, 80'000.0, 80'000.0});
   // L/v + v/a: the circle needs half of the acceleration at its speed, and the ramps are short.
   const double expected = 2.0 * kPi * 1600.0 / 8000.0 + 0.1;
-  EXPECT_NEAR(durationOf(motion::planContour(contour, limits).knots), expected, 0.01 * expected);
+  EXPECT_NEAR(durationOf(motion::planAccelerationLimited(path, limits).knots), expected,
+              0.01 * expected);
 }
 
-TEST(ContourMotion, StopsOnlyWhereItHasTo) {
-  const Contour contour(
+TEST(AccelerationLimitedTiming, StopsOnlyWhereItHasTo) {
+  const Path path(
       {0.0, 0.0},
       {lineTo({1000.0, 0.0}, 20.0), lineTo({1000.0, 1000.0}, 0.0), lineTo({0.0, 1000.0}, 20.0)},
       1.0);
-  const std::vector<ContourKnot> knots =
-      motion::planContour(contour, {{1000.0, 2000.0, 2000.0}, {1000.0, 2000.0, 2000.0}}).knots;
+  const std::vector<TimingKnot> knots =
+      motion::planAccelerationLimited(path, {{1000.0, 2000.0, 2000.0}, {1000.0, 2000.0, 2000.0}})
+          .knots;
   int stops = 0;
-  for (const ContourKnot& knot : knots) {
+  for (const TimingKnot& knot : knots) {
     if (knot.velocities[0] != 0.0 || knot.velocities[1] != 0.0) continue;
     ++stops;
     if (stops == 2) {
@@ -233,38 +235,38 @@ TEST(ContourMotion, StopsOnlyWhereItHasTo) {
 }
 
 // What a plan costs grows with its knots.
-TEST(ContourMotion, IsNearlyTimeOptimalWithFewKnots) {
+TEST(AccelerationLimitedTiming, IsNearlyTimeOptimalWithFewKnots) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> way(-160.0, 160.0);
   std::vector<double> place(3, 0.0);
-  std::vector<ContourSegment> segments;
+  std::vector<CurveSegment> segments;
   for (int i = 0; i < 200; ++i) {
     for (double& x : place) x += way(random);
     segments.push_back(lineTo(place, 4.0));
   }
-  const Contour contour({0.0, 0.0, 0.0}, segments, 1.0);
-  const std::vector<ContourLimits> limits(3, {8000.0, 80'000.0, 80'000.0});
-  const std::vector<ContourKnot> knots = motion::planContour(contour, limits).knots;
+  const Path path({0.0, 0.0, 0.0}, segments, 1.0);
+  const std::vector<TimingLimits> limits(3, {8000.0, 80'000.0, 80'000.0});
+  const std::vector<TimingKnot> knots = motion::planAccelerationLimited(path, limits).knots;
   EXPECT_LE(knots.size(), 18 * segments.size());
-  EXPECT_LE(durationOf(knots), 1.004 * FineGrid(contour, limits).shortestTime());
+  EXPECT_LE(durationOf(knots), 1.004 * FineGrid(path, limits).shortestTime());
 }
 
 // A curve that is given as many chords is nearly as fast as the curve: their roundings overlap. The
 // axes pass the shortest ones here in 0.15 ms, and knots are at least 20 us apart.
-TEST(ContourMotion, IsNearlyTimeOptimalOnDenseChords) {
+TEST(AccelerationLimitedTiming, IsNearlyTimeOptimalOnDenseChords) {
   constexpr int kChords = 200;
   for (const double length : {30.0, 10.0, 3.0, 0.3}) {
     const double radius = length * kChords / (2.0 * kPi);
-    std::vector<ContourSegment> segments;
+    std::vector<CurveSegment> segments;
     for (int i = 1; i <= kChords; ++i) {
       const double angle = 2.0 * kPi * i / kChords;
       segments.push_back(
           lineTo({radius * (std::cos(angle) - 1.0), 0.5 * radius * std::sin(angle)}, 1.6));
     }
-    const Contour contour({0.0, 0.0}, segments, 1.0);
-    const std::vector<ContourLimits> limits(2, {100'000.0, 400'000.0, 400'000.0});
-    EXPECT_LE(durationOf(motion::planContour(contour, limits).knots),
-              1.001 * FineGrid(contour, limits).shortestTime())
+    const Path path({0.0, 0.0}, segments, 1.0);
+    const std::vector<TimingLimits> limits(2, {100'000.0, 400'000.0, 400'000.0});
+    EXPECT_LE(durationOf(motion::planAccelerationLimited(path, limits).knots),
+              1.001 * FineGrid(path, limits).shortestTime())
         << "chords of " << length << " microsteps";
   }
 }
@@ -272,7 +274,7 @@ TEST(ContourMotion, IsNearlyTimeOptimalOnDenseChords) {
 // 10,000 chords of 0.1 mm at up to 0.1 m/s, 1 m/s^2, with a tolerance of 0.05 mm.
 double secondsOfChords(const std::function<double(int)>& turnAt) {
   constexpr double kLength = 8.0;  // microsteps
-  std::vector<ContourSegment> segments;
+  std::vector<CurveSegment> segments;
   std::vector<double> place(2, 0.0);
   double direction = 0.0;
   for (int i = 0; i < 10'000; ++i) {
@@ -281,11 +283,11 @@ double secondsOfChords(const std::function<double(int)>& turnAt) {
     place[1] += kLength * std::sin(direction);
     segments.push_back(lineTo(place, 4.0));
   }
-  const Contour contour({0.0, 0.0}, segments, 1.0);
-  return durationOf(motion::planContour(contour, {2, {8000.0, 80'000.0, 80'000.0}}).knots);
+  const Path path({0.0, 0.0}, segments, 1.0);
+  return durationOf(motion::planAccelerationLimited(path, {2, {8000.0, 80'000.0, 80'000.0}}).knots);
 }
 
-TEST(ContourMotion, UsesTheToleranceOnDenseChords) {
+TEST(AccelerationLimitedTiming, UsesTheToleranceOnDenseChords) {
   // A curve with a radius of 10 mm or more: at least 10 s less what the tolerance cuts off.
   EXPECT_LE(secondsOfChords([](int i) { return 0.01 * std::sin(2.0 * kPi * i / 700.0); }), 9.6);
   std::mt19937 random(5);
@@ -295,7 +297,7 @@ TEST(ContourMotion, UsesTheToleranceOnDenseChords) {
 
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
 // the fine grid's. That isn't fine enough for the last paths, whose Beziers lack handles.
-TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
+TEST(AccelerationLimitedTiming, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
   std::mt19937 random(2026);
   constexpr int kPaths = 1000;
   constexpr int kWithoutHandles = 200;
@@ -304,18 +306,19 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
   double worst_excess = 0.0;
   double worst_distance = 0.0;
   for (int i = 0; i < kPaths + kWithoutHandles; ++i) {
-    test::RandomContour path = test::randomContour(random);
-    if (i >= kPaths) test::dropHandles(path);
-    const Contour contour = path.contour();
-    const std::vector<ContourKnot> knots = motion::planContour(contour, path.limits).knots;
+    test::RandomPath given_path = test::randomPath(random);
+    if (i >= kPaths) test::dropHandles(given_path);
+    const Path path = given_path.path();
+    const std::vector<TimingKnot> knots =
+        motion::planAccelerationLimited(path, given_path.limits).knots;
     ASSERT_EQ(knots.front().time_ns, 0);
     std::vector<Profile> profiles;
-    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
-      const ContourLimits& limits = path.limits[axis];
+    for (std::size_t axis = 0; axis < path.axes(); ++axis) {
+      const TimingLimits& limits = given_path.limits[axis];
       ASSERT_EQ(knots.front().velocities[axis], 0.0);
       ASSERT_EQ(knots.back().velocities[axis], 0.0);
-      ASSERT_NEAR(knots.back().positions[axis], path.segments.back().end[axis], 1e-9);
-      profiles.push_back(profileOf(contour, knots, axis));
+      ASSERT_NEAR(knots.back().positions[axis], given_path.segments.back().end[axis], 1e-9);
+      profiles.push_back(profileOf(path, knots, axis));
       const motion::ProfilePeaks peaks = motion::profilePeaks(profiles.back());
       const double speed = std::abs(peaks.velocity.value) / limits.speed;
       ASSERT_LE(speed, 1.0 + 1e-6) << "path " << i << " axis " << axis;
@@ -337,11 +340,11 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
       }
     }
     if (i < kPaths) {
-      const double ratio = durationOf(knots) / FineGrid(contour, path.limits).shortestTime();
+      const double ratio = durationOf(knots) / FineGrid(path, given_path.limits).shortestTime();
       worst_ratio = std::max(worst_ratio, ratio);
       ratios += ratio;
-      EXPECT_LE(ratio, 1.02) << "path " << i << " of " << contour.size() << " segments, "
-                             << contour.axes() << " axes";
+      EXPECT_LE(ratio, 1.02) << "path " << i << " of " << path.size() << " segments, "
+                             << path.axes() << " axes";
       EXPECT_GE(ratio, 0.98) << "path " << i;
     }
     if (i % 10 != 0) continue;
@@ -350,10 +353,10 @@ TEST(ContourMotion, KeepsLimitsAndIsTimeOptimalOnRandomPaths) {
       double tolerance = 0.0;
       std::vector<std::vector<double>> samples;
       for (std::size_t near = segment - std::min<std::size_t>(segment, 1);
-           near < std::min(segment + 2, contour.size()); ++near) {
-        const auto more = samplesOf(contour, near);
+           near < std::min(segment + 2, path.size()); ++near) {
+        const auto more = samplesOf(path, near);
         samples.insert(samples.end(), more.begin(), more.end());
-        tolerance = std::max(tolerance, path.segments[near].tolerance);
+        tolerance = std::max(tolerance, given_path.segments[near].tolerance);
       }
       const std::int64_t time = (knots[k - 1].time_ns + knots[k].time_ns) / 2;
       std::vector<double> place;

@@ -13,9 +13,9 @@
 
 #include "geometry/path_grid.h"
 #include "support/constants.h"
+#include "support/jerk_limited_optimum.h"
 #include "support/path_line.h"
 #include "support/random_path.h"
-#include "support/smooth_optimum.h"
 
 // The motion along a path with jerk limits: within all limits, on the path, and how much longer it
 // takes than without them. A unit is a microstep.
@@ -24,15 +24,15 @@ namespace stepdriver {
 namespace {
 
 using motion::Continuity;
-using motion::Contour;
-using motion::ContourKnot;
-using motion::ContourLimits;
-using motion::ContourPoint;
-using motion::ContourSegment;
+using motion::CurveSegment;
+using motion::Path;
+using motion::PathPoint;
+using motion::TimingKnot;
+using motion::TimingLimits;
 using test::kPi;
 using test::lineTo;
 
-double secondsOf(const std::vector<ContourKnot>& knots) {
+double secondsOf(const std::vector<TimingKnot>& knots) {
   return static_cast<double>(knots.back().time_ns) * 1e-9;
 }
 
@@ -44,7 +44,7 @@ struct QuinticState {
   double jerk;
 };
 
-QuinticState quinticAt(const ContourKnot& from, const ContourKnot& to, std::size_t axis, double u) {
+QuinticState quinticAt(const TimingKnot& from, const TimingKnot& to, std::size_t axis, double u) {
   const double h = static_cast<double>(to.time_ns - from.time_ns) * 1e-9;
   const double way = to.positions[axis] - from.positions[axis];
   const double v0 = h * from.velocities[axis];
@@ -60,15 +60,15 @@ QuinticState quinticAt(const ContourKnot& from, const ContourKnot& to, std::size
           (6.0 * c3 + u * (24.0 * c4 + u * 60.0 * c5)) / (h * h * h)};
 }
 
-// How far a point is from the contour near some of its segments.
-class NearContour {
+// How far a point is from the path near some of its segments.
+class NearPath {
  public:
-  NearContour(const Contour& contour, std::size_t first, std::size_t last)
-      : contour_(contour), first_(first), last_(last) {
+  NearPath(const Path& path, std::size_t first, std::size_t last)
+      : path_(path), first_(first), last_(last) {
     for (std::size_t near = first - std::min<std::size_t>(first, 1);
-         near < std::min(last + 2, contour.size()); ++near) {
+         near < std::min(last + 2, path.size()); ++near) {
       for (int i = 0; i <= kParts; ++i) {
-        contour.evaluate(near, static_cast<double>(i) / kParts, point_);
+        path.evaluate(near, static_cast<double>(i) / kParts, point_);
         places_.push_back({near, static_cast<double>(i) / kParts, point_.position});
       }
     }
@@ -103,7 +103,7 @@ class NearContour {
 
   double leastAround(const Place& place, const std::vector<double>& position) {
     const auto square_at = [&](double u) {
-      contour_.evaluate(place.segment, u, point_);
+      path_.evaluate(place.segment, u, point_);
       return squareTo(position, point_.position);
     };
     double low = std::max(0.0, place.parameter - 1.0 / kParts);
@@ -119,17 +119,17 @@ class NearContour {
     return square_at(low);
   }
 
-  const Contour& contour_;
+  const Path& path_;
   std::size_t first_;
   std::size_t last_;
-  ContourPoint point_;
+  PathPoint point_;
   std::vector<Place> places_;
 };
 
-TEST(SmoothContourMotion, OfALineHasTheSevenPhasesOfTheFastest) {
-  const auto duration = [](double length, const ContourLimits& limits) {
-    const Contour contour({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
-    return secondsOf(motion::planSmoothContour(contour, {limits}).knots);
+TEST(JerkLimitedTiming, OfALineHasTheSevenPhasesOfTheFastest) {
+  const auto duration = [](double length, const TimingLimits& limits) {
+    const Path path({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    return secondsOf(motion::planJerkLimited(path, {limits}).knots);
   };
   // 1000/1000 + 1000/5000 + 5000/50000
   EXPECT_NEAR(duration(1000.0, {1000.0, 5000.0, 5000.0, 50'000.0}), 1.3, 1e-6);
@@ -141,16 +141,16 @@ TEST(SmoothContourMotion, OfALineHasTheSevenPhasesOfTheFastest) {
   EXPECT_GE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), optimum - 1e-9);
 }
 
-TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
-  std::vector<ContourSegment> segments;
+TEST(JerkLimitedTiming, PassesACircleOfLinesWithoutStopping) {
+  std::vector<CurveSegment> segments;
   for (int i = 1; i <= 100; ++i) {
     const double angle = 2.0 * kPi * i / 100.0;
     segments.push_back(lineTo({1600.0 * std::cos(angle) - 1600.0, 1600.0 * std::sin(angle)}, 1.6));
   }
-  const std::vector<ContourLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
-  const Contour contour({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
-  const double smooth = secondsOf(motion::planSmoothContour(contour, limits).knots);
-  const double fastest = secondsOf(motion::planContour(contour, limits).knots);
+  const std::vector<TimingLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Path path({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  const double smooth = secondsOf(motion::planJerkLimited(path, limits).knots);
+  const double fastest = secondsOf(motion::planAccelerationLimited(path, limits).knots);
   RecordProperty("smooth", std::to_string(smooth));
   RecordProperty("fastest", std::to_string(fastest));
   EXPECT_LE(smooth, 1.5 * fastest);
@@ -159,7 +159,7 @@ TEST(SmoothContourMotion, PassesACircleOfLinesWithoutStopping) {
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
 // that without a jerk limit, which no motion with one can go below. The Beziers of the last paths
 // lack handles.
-TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
+TEST(JerkLimitedTiming, KeepsLimitsOnRandomPaths) {
   std::mt19937 random(2027);
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -171,34 +171,35 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
   double worst_jerk = 0.0;
   double worst_distance = 0.0;
   for (int i = 0; i < kPaths + kWithoutHandles; ++i) {
-    test::RandomContour path = test::randomContour(random);
-    if (i >= kPaths) test::dropHandles(path);
+    test::RandomPath given_path = test::randomPath(random);
+    if (i >= kPaths) test::dropHandles(given_path);
     // Accelerations that take 1 to 100 ms to build up; some axes have no jerk limit.
-    for (std::size_t axis = 0; axis < path.limits.size(); ++axis) {
+    for (std::size_t axis = 0; axis < given_path.limits.size(); ++axis) {
       if (axis > 0 && number(0.0, 1.0) < 0.3) continue;
-      path.limits[axis].jerk = path.limits[axis].acceleration * std::pow(10.0, number(1.0, 3.0));
+      given_path.limits[axis].jerk =
+          given_path.limits[axis].acceleration * std::pow(10.0, number(1.0, 3.0));
     }
-    const Contour rounded = path.contour(Continuity::kCurvature);
-    const motion::ContourPlan plan = motion::planSmoothContour(rounded, path.limits);
-    const Contour contour = rounded.withStops(plan.stops);
-    const std::vector<ContourKnot>& knots = plan.knots;
+    const Path rounded = given_path.path(Continuity::kCurvature);
+    const motion::PathTiming plan = motion::planJerkLimited(rounded, given_path.limits);
+    const Path path = rounded.withStops(plan.stops);
+    const std::vector<TimingKnot>& knots = plan.knots;
     ASSERT_EQ(knots.front().time_ns, 0);
-    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
-      ASSERT_NEAR(knots.back().positions[axis], path.segments.back().end[axis], 1e-9);
-      for (const ContourKnot* end : {&knots.front(), &knots.back()}) {
+    for (std::size_t axis = 0; axis < path.axes(); ++axis) {
+      ASSERT_NEAR(knots.back().positions[axis], given_path.segments.back().end[axis], 1e-9);
+      for (const TimingKnot* end : {&knots.front(), &knots.back()}) {
         ASSERT_EQ(end->velocities[axis], 0.0);
         ASSERT_EQ(end->accelerations[axis], 0.0);
       }
     }
-    std::vector<NearContour> near;
+    std::vector<NearPath> near;
     for (std::size_t k = 1; k < knots.size(); ++k) {
-      const ContourKnot& from = knots[k - 1];
-      const ContourKnot& to = knots[k];
+      const TimingKnot& from = knots[k - 1];
+      const TimingKnot& to = knots[k];
       ASSERT_LT(from.time_ns, to.time_ns);
       constexpr int kParts = 10;
       std::vector<double> middle;
-      for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
-        const ContourLimits& limits = path.limits[axis];
+      for (std::size_t axis = 0; axis < path.axes(); ++axis) {
+        const TimingLimits& limits = given_path.limits[axis];
         for (int part = 0; part <= kParts; ++part) {
           const QuinticState state = quinticAt(from, to, axis, static_cast<double>(part) / kParts);
           const double most = std::max(limits.acceleration, limits.deceleration);
@@ -212,14 +213,15 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
       }
       if (i % 10 != 0) continue;
       if (near.empty() || !near.back().isOf(from.segment, to.segment)) {
-        near.emplace_back(contour, from.segment, to.segment);
+        near.emplace_back(path, from.segment, to.segment);
       }
       const double distance = near.back().distance(middle);
       worst_distance = std::max(worst_distance, distance);
       ASSERT_LE(distance, 0.1) << "path " << i << " knot " << k << " of " << knots.size();
     }
     const double ratio =
-        secondsOf(knots) / secondsOf(motion::planContour(rounded, path.limits).knots);
+        secondsOf(knots) /
+        secondsOf(motion::planAccelerationLimited(rounded, given_path.limits).knots);
     EXPECT_GE(ratio, 0.995) << "path " << i;
     if (i >= kPaths) continue;
     worst_ratio = std::max(worst_ratio, ratio);
@@ -233,8 +235,8 @@ TEST(SmoothContourMotion, KeepsLimitsOnRandomPaths) {
 }
 
 // The largest part of its limits that an axis uses between two knots.
-double demandBetween(const ContourKnot& from, const ContourKnot& to,
-                     const std::vector<ContourLimits>& limits) {
+double demandBetween(const TimingKnot& from, const TimingKnot& to,
+                     const std::vector<TimingLimits>& limits) {
   double most = 0.0;
   constexpr int kParts = 10;
   for (std::size_t axis = 0; axis < limits.size(); ++axis) {
@@ -250,18 +252,18 @@ double demandBetween(const ContourKnot& from, const ContourKnot& to,
 
 // Only the places at which a limit is exceeded become slower: on 500 lines in random directions,
 // the motion is at a limit in every part that takes a second.
-TEST(SmoothContourMotion, IsNotSlowedDownAsAWholeForOnePlace) {
+TEST(JerkLimitedTiming, IsNotSlowedDownAsAWholeForOnePlace) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> way(-160.0, 160.0);
-  std::vector<ContourSegment> segments;
+  std::vector<CurveSegment> segments;
   std::vector<double> place(3, 0.0);
   for (int i = 0; i < 500; ++i) {
     for (double& x : place) x += way(random);
     segments.push_back(lineTo(place, 4.0));
   }
-  const std::vector<ContourLimits> limits(3, {8000.0, 80'000.0, 80'000.0, 1.6e6});
-  const Contour contour({0.0, 0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
-  const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
+  const std::vector<TimingLimits> limits(3, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Path path({0.0, 0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  const std::vector<TimingKnot> knots = motion::planJerkLimited(path, limits).knots;
   std::vector<double> demands(static_cast<std::size_t>(secondsOf(knots)) + 1, 0.0);
   for (std::size_t k = 1; k < knots.size(); ++k) {
     double& most = demands[static_cast<std::size_t>(knots[k].time_ns / 1'000'000'000)];
@@ -275,19 +277,19 @@ TEST(SmoothContourMotion, IsNotSlowedDownAsAWholeForOnePlace) {
 }
 
 // The same path, with stops at all corners or with one tolerance for all of them.
-double secondsWithTolerance(std::vector<double> start, std::vector<ContourSegment> segments,
-                            const std::vector<ContourLimits>& limits, double tolerance) {
-  for (ContourSegment& segment : segments) segment.tolerance = tolerance;
-  const Contour contour(std::move(start), segments, 1.0, Continuity::kCurvature);
-  return secondsOf(motion::planSmoothContour(contour, limits).knots);
+double secondsWithTolerance(std::vector<double> start, std::vector<CurveSegment> segments,
+                            const std::vector<TimingLimits>& limits, double tolerance) {
+  for (CurveSegment& segment : segments) segment.tolerance = tolerance;
+  const Path path(std::move(start), segments, 1.0, Continuity::kCurvature);
+  return secondsOf(motion::planJerkLimited(path, limits).knots);
 }
 
 // The motion stops at tight corners: passing them takes longer.
-TEST(SmoothContourMotion, StopsAtCornersThatItCanNotPassFaster) {
+TEST(JerkLimitedTiming, StopsAtCornersThatItCanNotPassFaster) {
   constexpr double kMillimetre = 80.0;
   const std::vector<double> tolerances{0.08, 0.8, 4.0, 8.0};
-  const auto expect_not_slower = [&](const char* name, const std::vector<ContourSegment>& segments,
-                                     const std::vector<ContourLimits>& limits) {
+  const auto expect_not_slower = [&](const char* name, const std::vector<CurveSegment>& segments,
+                                     const std::vector<TimingLimits>& limits) {
     const std::vector<double> start(limits.size(), 0.0);
     const double stopping = secondsWithTolerance(start, segments, limits, 0.0);
     for (const double tolerance : tolerances) {
@@ -295,8 +297,8 @@ TEST(SmoothContourMotion, StopsAtCornersThatItCanNotPassFaster) {
           << name << " with " << tolerance;
     }
   };
-  const ContourLimits limit{8000.0, 80'000.0, 80'000.0, 1.6e6};
-  std::vector<ContourSegment> zigzag;
+  const TimingLimits limit{8000.0, 80'000.0, 80'000.0, 1.6e6};
+  std::vector<CurveSegment> zigzag;
   for (int i = 1; i <= 4; ++i) {
     zigzag.push_back(lineTo({i * kMillimetre, i % 2 == 0 ? 0.0 : 2.0 * kMillimetre}, 0.0));
   }
@@ -304,7 +306,7 @@ TEST(SmoothContourMotion, StopsAtCornersThatItCanNotPassFaster) {
 
   std::mt19937 random(5);
   std::uniform_real_distribution<double> way(-2.0 * kMillimetre, 2.0 * kMillimetre);
-  std::vector<ContourSegment> lines;
+  std::vector<CurveSegment> lines;
   std::vector<double> place(3, 0.0);
   for (int i = 0; i < 100; ++i) {
     for (double& x : place) x += way(random);
@@ -313,8 +315,8 @@ TEST(SmoothContourMotion, StopsAtCornersThatItCanNotPassFaster) {
   expect_not_slower("random lines", lines, {3, limit});
 
   const double length = 1000.0 * kMillimetre;
-  ContourSegment arc;
-  arc.shape = ContourSegment::Shape::kArc;
+  CurveSegment arc;
+  arc.shape = CurveSegment::Shape::kArc;
   arc.plane = {0, 1};
   arc.angle = 1.0;
   arc.centre = {length - length / 2.0 * std::sin(1.0), length / 2.0 * std::cos(1.0)};
@@ -325,21 +327,22 @@ TEST(SmoothContourMotion, StopsAtCornersThatItCanNotPassFaster) {
                     {2, {40'000.0, 160'000.0, 160'000.0, 4e6}});
 }
 
-TEST(SmoothContourMotion, IsNotSlowerThanWithStopsOnRandomPaths) {
+TEST(JerkLimitedTiming, IsNotSlowerThanWithStopsOnRandomPaths) {
   std::mt19937 random(2027);
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   double worst = 0.0;
   for (int i = 0; i < 250; ++i) {
-    test::RandomContour path = test::randomContour(random);
-    for (ContourLimits& limits : path.limits) {
+    test::RandomPath given_path = test::randomPath(random);
+    for (TimingLimits& limits : given_path.limits) {
       limits.jerk = limits.acceleration * std::pow(10.0, number(0.0, 3.0));
     }
-    const double stopping = secondsWithTolerance(path.start, path.segments, path.limits, 0.0);
+    const double stopping =
+        secondsWithTolerance(given_path.start, given_path.segments, given_path.limits, 0.0);
     for (const double tolerance : {0.02, 0.3, 4.0, 50.0, 600.0}) {
       const double seconds =
-          secondsWithTolerance(path.start, path.segments, path.limits, tolerance);
+          secondsWithTolerance(given_path.start, given_path.segments, given_path.limits, tolerance);
       EXPECT_LE(seconds, 1.001 * stopping) << "path " << i << " with " << tolerance;
       worst = std::max(worst, seconds / stopping);
     }
@@ -350,18 +353,17 @@ TEST(SmoothContourMotion, IsNotSlowerThanWithStopsOnRandomPaths) {
 // The distance and the speed along a section at a time, from its knots.
 class AlongSection {
  public:
-  AlongSection(const motion::ContourGrid& grid, const std::vector<ContourKnot>& knots)
-      : knots_(knots) {
+  AlongSection(const motion::PathGrid& grid, const std::vector<TimingKnot>& knots) : knots_(knots) {
     double begin = 0.0;
     std::size_t interval = 0;
-    for (const ContourKnot& knot : knots) {
-      const auto ends_before = [&](const motion::ContourGrid::Interval& of) {
+    for (const TimingKnot& knot : knots) {
+      const auto ends_before = [&](const motion::PathGrid::Interval& of) {
         return of.segment < knot.segment || (of.segment == knot.segment && of.to < knot.parameter);
       };
       while (interval + 1 < grid.size() && ends_before(grid[interval])) {
         begin += grid[interval++].length;
       }
-      const motion::ContourGrid::Interval& in = grid[interval];
+      const motion::PathGrid::Interval& in = grid[interval];
       const double part = std::clamp((knot.parameter - in.from) / (in.to - in.from), 0.0, 1.0);
       distances_.push_back(begin + part * in.length);
     }
@@ -387,22 +389,22 @@ class AlongSection {
   }
 
  private:
-  const std::vector<ContourKnot>& knots_;
+  const std::vector<TimingKnot>& knots_;
   std::vector<double> distances_;
 };
 
 // [s] The optimum between two stops, at places that the planned motion passes at even times.
-double optimumOf(const Contour& section, const std::vector<ContourLimits>& limits,
-                 const std::vector<ContourKnot>& knots, int parts) {
-  const motion::ContourGrid grid(section);
+double optimumOf(const Path& section, const std::vector<TimingLimits>& limits,
+                 const std::vector<TimingKnot>& knots, int parts) {
+  const motion::PathGrid grid(section);
   std::vector<double> begins{0.0};
   for (std::size_t i = 0; i < grid.size(); ++i) begins.push_back(begins.back() + grid[i].length);
   const AlongSection along(grid, knots);
-  std::vector<test::SmoothOptimum::Place> places;
+  std::vector<test::JerkLimitedOptimum::Place> places;
   std::vector<double> squares;
-  ContourPoint point;
-  ContourPoint before;
-  ContourPoint after;
+  PathPoint point;
+  PathPoint before;
+  PathPoint after;
   std::size_t interval = 0;
   for (int i = 0; i <= parts; ++i) {
     const AlongSection::State state = along.at(secondsOf(knots) * i / parts);
@@ -411,8 +413,9 @@ double optimumOf(const Contour& section, const std::vector<ContourLimits>& limit
     while (interval + 1 < grid.size() && begins[interval + 1] <= distance) ++interval;
     const double in = std::clamp(distance - begins[interval], 0.0, grid[interval].length);
     grid.evaluateAt(interval, in, point);
-    test::SmoothOptimum::Place place{distance, std::numeric_limits<double>::infinity(), point.first,
-                                     point.second, std::vector<double>(limits.size())};
+    test::JerkLimitedOptimum::Place place{distance, std::numeric_limits<double>::infinity(),
+                                          point.first, point.second,
+                                          std::vector<double>(limits.size())};
     if (!grid[interval].straight) {
       const double near = std::max(0.0, in - 1e-3 * grid[interval].length);
       const double far = std::min(grid[interval].length, in + 1e-3 * grid[interval].length);
@@ -435,15 +438,15 @@ double optimumOf(const Contour& section, const std::vector<ContourLimits>& limit
     places.push_back(std::move(place));
     squares.push_back(std::max(1e-12, state.speed * state.speed));
   }
-  return test::SmoothOptimum(std::move(places), limits, std::move(squares)).duration();
+  return test::JerkLimitedOptimum(std::move(places), limits, std::move(squares)).duration();
 }
 
-TEST(SmoothContourMotion, HasAKnownOptimumOnALine) {
-  const auto durations = [](double length, const ContourLimits& limit) {
-    const Contour contour({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
-    const std::vector<ContourLimits> limits{limit};
-    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, limits).knots;
-    return std::pair(secondsOf(knots), optimumOf(contour, limits, knots, 400));
+TEST(JerkLimitedTiming, HasAKnownOptimumOnALine) {
+  const auto durations = [](double length, const TimingLimits& limit) {
+    const Path path({0.0}, {lineTo({length}, 0.0)}, 1.0, Continuity::kCurvature);
+    const std::vector<TimingLimits> limits{limit};
+    const std::vector<TimingKnot> knots = motion::planJerkLimited(path, limits).knots;
+    return std::pair(secondsOf(knots), optimumOf(path, limits, knots, 400));
   };
   for (const double jerk : {20'000.0, 50'000.0, 1e6}) {
     const auto [planned, found] = durations(1000.0, {1000.0, 5000.0, 5000.0, jerk});
@@ -453,7 +456,7 @@ TEST(SmoothContourMotion, HasAKnownOptimumOnALine) {
 }
 
 // How much longer the planned motion takes than an optimum with the same limits.
-TEST(SmoothContourMotion, IsNearTheOptimumOnRandomPaths) {
+TEST(JerkLimitedTiming, IsNearTheOptimumOnRandomPaths) {
   std::mt19937 random(2027);
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -463,27 +466,29 @@ TEST(SmoothContourMotion, IsNearTheOptimumOnRandomPaths) {
   double worst = 0.0;
   double jerk_ratios = 0.0;
   for (int i = 0; i < kPaths; ++i) {
-    test::RandomContour path = test::randomContour(random);
-    for (ContourLimits& limits : path.limits) {
+    test::RandomPath given_path = test::randomPath(random);
+    for (TimingLimits& limits : given_path.limits) {
       limits.jerk = limits.acceleration * std::pow(10.0, number(1.0, 3.0));
     }
-    const Contour contour = path.contour(Continuity::kCurvature);
+    const Path path = given_path.path(Continuity::kCurvature);
     double planned = 0.0;
     double optimum = 0.0;
-    for (std::size_t first = 0; first < contour.size();) {
+    for (std::size_t first = 0; first < path.size();) {
       std::size_t last = first;
-      while (!contour.stopsAfter(last) && last + 1 < contour.size()) ++last;
-      const Contour section = contour.part(first, last);
-      const std::vector<ContourKnot> knots = motion::planSmoothContour(section, path.limits).knots;
+      while (!path.stopsAfter(last) && last + 1 < path.size()) ++last;
+      const Path section = path.part(first, last);
+      const std::vector<TimingKnot> knots =
+          motion::planJerkLimited(section, given_path.limits).knots;
       planned += secondsOf(knots);
-      optimum += optimumOf(section, path.limits, knots, 600);
+      optimum += optimumOf(section, given_path.limits, knots, 600);
       first = last + 1;
     }
     const double ratio = planned / optimum;
     EXPECT_GE(ratio, 0.98) << "path " << i;
     ratios += ratio;
     worst = std::max(worst, ratio);
-    jerk_ratios += optimum / secondsOf(motion::planContour(contour, path.limits).knots);
+    jerk_ratios +=
+        optimum / secondsOf(motion::planAccelerationLimited(path, given_path.limits).knots);
   }
   EXPECT_LE(ratios / kPaths, 1.09);
   EXPECT_LE(worst, 1.5);
@@ -494,39 +499,39 @@ TEST(SmoothContourMotion, IsNearTheOptimumOnRandomPaths) {
 
 // Far from 0, with a tiny and a very long line at the end, and accelerations that take 10 us to 10
 // s to build up: rounding doesn't take the jerk beyond what a trajectory may have.
-TEST(SmoothContourMotion, KeepsTheJerkAtExtremes) {
+TEST(JerkLimitedTiming, KeepsTheJerkAtExtremes) {
   std::mt19937 random(77);
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   for (int i = 0; i < 100; ++i) {
-    test::RandomContour path = test::randomContour(random);
+    test::RandomPath given_path = test::randomPath(random);
     const double offset = number(0.0, 1.0) < 0.5 ? 0.0 : 1e7;
     const auto shift = [&](std::vector<double>& position) {
       for (double& x : position) x += offset;
     };
-    shift(path.start);
-    for (ContourSegment& segment : path.segments) {
+    shift(given_path.start);
+    for (CurveSegment& segment : given_path.segments) {
       shift(segment.end);
       shift(segment.control1);
       shift(segment.control2);
       for (double& x : segment.centre) x += offset;
     }
-    std::vector<double> end = path.segments.back().end;
+    std::vector<double> end = given_path.segments.back().end;
     for (const double length : {0.001, 1e6}) {
       end[0] += length;
-      path.segments.push_back(lineTo(end, 0.1));
+      given_path.segments.push_back(lineTo(end, 0.1));
     }
-    for (ContourLimits& limits : path.limits) {
+    for (TimingLimits& limits : given_path.limits) {
       limits.jerk = limits.acceleration * std::pow(10.0, number(-1.0, 5.0));
     }
-    const Contour contour = path.contour(Continuity::kCurvature);
-    const std::vector<ContourKnot> knots = motion::planSmoothContour(contour, path.limits).knots;
-    for (std::size_t axis = 0; axis < contour.axes(); ++axis) {
+    const Path path = given_path.path(Continuity::kCurvature);
+    const std::vector<TimingKnot> knots = motion::planJerkLimited(path, given_path.limits).knots;
+    for (std::size_t axis = 0; axis < path.axes(); ++axis) {
       for (std::size_t k = 1; k < knots.size(); ++k) {
         for (const double u : {0.0, 0.5, 1.0}) {
           const QuinticState state = quinticAt(knots[k - 1], knots[k], axis, u);
-          ASSERT_LE(std::abs(state.jerk), 1.01 * path.limits[axis].jerk)
+          ASSERT_LE(std::abs(state.jerk), 1.01 * given_path.limits[axis].jerk)
               << "path " << i << " knot " << k << " axis " << axis;
         }
       }

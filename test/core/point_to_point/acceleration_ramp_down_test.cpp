@@ -20,12 +20,12 @@ MotionLimits limitsOf(double jerk) { return {kStartSpeed, kMaxSpeed, 2000.0, 200
 
 /// The rest is a move to a target far ahead.
 Profile moveOf(const MotionState& from, const MotionLimits& limits, double most_jerk) {
-  const LevelOff level_off(5, from, limits, most_jerk);
-  return level_off.followedBy(planMove(level_off.endNs(), level_off.end(), 100'000'000, limits))
+  const AccelerationRampDown ramp_down(5, from, limits, most_jerk);
+  return ramp_down.followedBy(planMove(ramp_down.endNs(), ramp_down.end(), 100'000'000, limits))
       .profile;
 }
 
-TEST(LevelOff, KeepsTheSpeedBetweenStandstillAndItsMaximum) {
+TEST(AccelerationRampDown, KeepsTheSpeedBetweenStandstillAndItsMaximum) {
   std::mt19937_64 random(3);
   const auto any = [&random](double least, double most) {
     return std::uniform_real_distribution<double>(least, most)(random);
@@ -36,7 +36,7 @@ TEST(LevelOff, KeepsTheSpeedBetweenStandstillAndItsMaximum) {
     from.acceleration = any(-2000.0, 2000.0);
     const Profile whole = moveOf(from, limitsOf(kLowJerk), i % 2 == 0 ? 0.0 : 1e9);
     ASSERT_LE(whole.peakSpeed(), kMaxSpeed * (1.0 + 1e-6)) << from.acceleration;
-    ASSERT_GE(extentOf(whole).lowest, 0.0) << from.velocity << " " << from.acceleration;
+    ASSERT_GE(positionRangeOf(whole).lowest, 0.0) << from.velocity << " " << from.acceleration;
     ASSERT_EQ(whole.startNs(), 5);
     ASSERT_EQ(whole.endPosition().value(), 100'000'000.0);
     MotionState end = from;
@@ -48,47 +48,49 @@ TEST(LevelOff, KeepsTheSpeedBetweenStandstillAndItsMaximum) {
   }
 }
 
-TEST(LevelOff, TakesTheAccelerationBackWithTheJerkThatThisNeeds) {
+TEST(AccelerationRampDown, TakesTheAccelerationBackWithTheJerkThatThisNeeds) {
   MotionState from;
   from.velocity = 540.0;
   from.acceleration = -500.0;
   // 500 steps/s to the start speed: 500^2 / (2 * 500) steps/s^3.
-  const LevelOff slower(0, from, limitsOf(kLowJerk), 1e6);
+  const AccelerationRampDown slower(0, from, limitsOf(kLowJerk), 1e6);
   EXPECT_NEAR(static_cast<double>(slower.endNs()), 2e9, 2.0);
   EXPECT_NEAR(slower.end().velocity, kStartSpeed, 1e-5);
   EXPECT_EQ(slower.end().acceleration, 0.0);
   from.acceleration = 500.0;
   // 460 steps/s to the maximum.
-  const LevelOff faster(0, from, limitsOf(kLowJerk), 1e6);
+  const AccelerationRampDown faster(0, from, limitsOf(kLowJerk), 1e6);
   EXPECT_NEAR(static_cast<double>(faster.endNs()), 1.84e9, 2.0);
   EXPECT_NEAR(faster.end().velocity, kMaxSpeed, 1e-5);
 }
 
-TEST(LevelOff, UsesNoHigherJerkThanThatOfTheMotionBefore) {
+TEST(AccelerationRampDown, UsesNoHigherJerkThanThatOfTheMotionBefore) {
   MotionState from;
   from.velocity = kMaxSpeed;
   from.acceleration = 500.0;
-  const LevelOff limited(0, from, limitsOf(kLowJerk), 1000.0);
+  const AccelerationRampDown limited(0, from, limitsOf(kLowJerk), 1000.0);
   EXPECT_NEAR(static_cast<double>(limited.endNs()), 0.5e9, 2.0);
-  const LevelOff unlimited(0, from, limitsOf(kLowJerk), 0.0);
+  const AccelerationRampDown unlimited(0, from, limitsOf(kLowJerk), 0.0);
   EXPECT_EQ(unlimited.endNs(), 0);
   EXPECT_EQ(unlimited.end().acceleration, 0.0) << "it may jump";
 }
 
-TEST(LevelOff, IsNotNeededIfTheJerkSuffices) {
+TEST(AccelerationRampDown, IsNotNeededIfTheJerkSuffices) {
   MotionState from;
   from.velocity = 540.0;
   from.acceleration = 500.0;
   const double enough = 500.0 * 500.0 / (2.0 * 460.0);
-  EXPECT_FALSE(LevelOff(0, from, limitsOf(enough), 1e6).isNeeded());
-  EXPECT_TRUE(LevelOff(0, from, limitsOf(0.99 * enough), 1e6).isNeeded());
-  EXPECT_FALSE(LevelOff(0, from, limitsOf(0.0), 1e6).isNeeded()) << "the acceleration may jump";
+  EXPECT_FALSE(AccelerationRampDown(0, from, limitsOf(enough), 1e6).isNeeded());
+  EXPECT_TRUE(AccelerationRampDown(0, from, limitsOf(0.99 * enough), 1e6).isNeeded());
+  EXPECT_FALSE(AccelerationRampDown(0, from, limitsOf(0.0), 1e6).isNeeded())
+      << "the acceleration may jump";
   from.acceleration = 0.0;
-  EXPECT_FALSE(LevelOff(0, from, limitsOf(kLowJerk), 1e6).isNeeded());
+  EXPECT_FALSE(AccelerationRampDown(0, from, limitsOf(kLowJerk), 1e6).isNeeded());
   from = {};
   from.velocity = 0.5 * kStartSpeed;
   from.acceleration = -500.0;
-  EXPECT_FALSE(LevelOff(0, from, limitsOf(kLowJerk), 1e6).isNeeded()) << "it can stop at once";
+  EXPECT_FALSE(AccelerationRampDown(0, from, limitsOf(kLowJerk), 1e6).isNeeded())
+      << "it can stop at once";
 }
 
 }  // namespace

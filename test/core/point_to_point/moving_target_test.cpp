@@ -10,7 +10,7 @@
 namespace stepdriver::motion {
 namespace {
 
-MotionLimits pursuitLimits(double jerk) {
+MotionLimits interceptLimits(double jerk) {
   MotionLimits limits;
   limits.max_speed = 1000.0;
   limits.acceleration = 2000.0;
@@ -49,22 +49,22 @@ void expectGood(const std::vector<Piece>& pieces, const MotionState& from,
   }
 }
 
-TEST(Pursuit, EndsAtThePointAndWithItsVelocityFromAnyState) {
+TEST(Intercept, EndsAtThePointAndWithItsVelocityFromAnyState) {
   std::mt19937_64 random(7);
   const auto any = [&random](double most) {
     return std::uniform_real_distribution<double>(-most, most)(random);
   };
   for (int i = 0; i < 20'000; ++i) {
-    const MotionLimits limits = pursuitLimits(i % 2 == 0 ? 0.0 : 50'000.0);
+    const MotionLimits limits = interceptLimits(i % 2 == 0 ? 0.0 : 50'000.0);
     MotionState from;
     from.position = DoubleDouble(any(1e6));
     // Not beyond the limits a moment later.
     from.velocity = any(950.0);
     from.acceleration = limits.jerk > 0.0 ? any(1000.0) : 0.0;
-    const MovingPoint point{from.position + any(i % 3 == 0 ? 1000.0 : 2.0),
-                            i % 5 == 0 ? 0.0 : any(980.0)};
+    const MovingTarget point{from.position + any(i % 3 == 0 ? 1000.0 : 2.0),
+                             i % 5 == 0 ? 0.0 : any(980.0)};
     const double within = i % 4 == 0 ? 0.02 : 0.0;
-    const std::vector<Piece> pieces = joinPoint(from, point, limits, within);
+    const std::vector<Piece> pieces = planIntercept(from, point, limits, within);
     expectGood(pieces, from, limits);
     const MotionState end = endOf(pieces, from);
     const double duration = durationOf(pieces);
@@ -76,31 +76,31 @@ TEST(Pursuit, EndsAtThePointAndWithItsVelocityFromAnyState) {
   }
 }
 
-TEST(Pursuit, TakesTheClosedFormToCatchUp) {
+TEST(Intercept, TakesTheClosedFormToCatchUp) {
   // 10 microsteps behind at the same velocity: up and down by 2000/s^2, 2 sqrt(10/2000).
-  const std::vector<Piece> pieces = joinPoint({DoubleDouble(0.0), 500.0, 0.0},
-                                              {DoubleDouble(10.0), 500.0}, pursuitLimits(0.0), 0.0);
+  const std::vector<Piece> pieces = planIntercept(
+      {DoubleDouble(0.0), 500.0, 0.0}, {DoubleDouble(10.0), 500.0}, interceptLimits(0.0), 0.0);
   EXPECT_NEAR(durationOf(pieces), 2.0 * std::sqrt(10.0 / 2000.0), 1e-9);
 }
 
-TEST(Pursuit, MakesASmallCorrectionSlowly) {
+TEST(Intercept, MakesASmallCorrectionSlowly) {
   const MotionState from{DoubleDouble(0.0), 500.0, 0.0};
   const std::vector<Piece> pieces =
-      joinPoint(from, {DoubleDouble(0.02), 500.0}, pursuitLimits(0.0), 0.02);
+      planIntercept(from, {DoubleDouble(0.02), 500.0}, interceptLimits(0.0), 0.02);
   EXPECT_GT(durationOf(pieces), 0.008);
   EXPECT_LE(durationOf(pieces), 0.02 + 1e-9);
   for (const Piece& piece : pieces) EXPECT_LE(std::abs(piece.a), 1000.0);
 }
 
-TEST(Pursuit, NeedsNothingOnThePoint) {
+TEST(Intercept, NeedsNothingOnThePoint) {
   const MotionState from{DoubleDouble(3.0), 500.0, 0.0};
-  EXPECT_TRUE(joinPoint(from, {DoubleDouble(3.0), 500.0}, pursuitLimits(0.0), 0.01).empty());
+  EXPECT_TRUE(planIntercept(from, {DoubleDouble(3.0), 500.0}, interceptLimits(0.0), 0.01).empty());
 }
 
-TEST(Pursuit, TheFirstPartEndsAtItsTime) {
+TEST(Intercept, TheFirstPartEndsAtItsTime) {
   const MotionState from{DoubleDouble(0.0), 0.0, 0.0};
   const std::vector<Piece> pieces =
-      joinPoint(from, {DoubleDouble(10.0), 500.0}, pursuitLimits(0.0), 0.0);
+      planIntercept(from, {DoubleDouble(10.0), 500.0}, interceptLimits(0.0), 0.0);
   const double half = 0.5 * durationOf(pieces);
   const std::vector<Piece> first = firstPart(pieces, half);
   EXPECT_NEAR(durationOf(first), half, 1e-15);

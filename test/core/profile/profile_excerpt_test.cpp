@@ -85,10 +85,10 @@ Profile randomPath(std::mt19937& random, const Profile& course) {
   const double place = random() % 3 == 0 ? 0.0 : 0.8 * share(random) * end.value();
   const double rate = random() % 2 == 0 ? 1.0 : share(random);
   const double wanted = random() % 3 == 0 ? 0.0 : random() % 2 == 0 ? 1.0 : share(random);
-  const RateLimits limits{1.0 + 20.0 * share(random), random() % 2 == 0 ? 0.0 : 100.0};
+  const FeedRateLimits limits{1.0 + 20.0 * share(random), random() % 2 == 0 ? 0.0 : 100.0};
   const double after = rate > 0.0 && random() % 3 == 0 ? 0.05 * share(random) : 0.0;
-  return planRate(static_cast<std::int64_t>(random() % 1000), {place, rate, 0.0}, wanted, limits,
-                  after, end);
+  return planFeedRate(static_cast<std::int64_t>(random() % 1000), {place, rate, 0.0}, wanted,
+                      limits, after, end);
 }
 
 TEST(ProfileExcerpt, HasTheStepsOfPiecesThatAreMadeBeforehand) {

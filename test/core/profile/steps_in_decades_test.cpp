@@ -277,9 +277,9 @@ Profile anyMove(Random& random, std::int64_t now, const MotionState& state,
                 const MotionLimits& limits) {
   const std::int64_t target = anyTarget(random, state, limits, 1e12);
   const double most_jerk = random.chance(0.3) ? 0.0 : limits.jerk * random.decades(0.0, 6.0);
-  const LevelOff level_off(now, state, limits, most_jerk);
+  const AccelerationRampDown ramp_down(now, state, limits, most_jerk);
   const Profile profile =
-      level_off.followedBy(planMove(level_off.endNs(), level_off.end(), target, limits)).profile;
+      ramp_down.followedBy(planMove(ramp_down.endNs(), ramp_down.end(), target, limits)).profile;
   MotionState end = endOf(profile);
   if (limits.start_speed > 0.0) end.velocity = 0.0;  // it stops from there at once
   expectEnd(end, {fromInteger(target), 0.0, 0.0}, state, limits);
@@ -287,13 +287,13 @@ Profile anyMove(Random& random, std::int64_t now, const MotionState& state,
 }
 
 /// Joins a moving point.
-Profile anyPursuit(Random& random, std::int64_t now, const MotionState& state,
-                   const MotionLimits& limits) {
-  const MovingPoint point{
+Profile anyIntercept(Random& random, std::int64_t now, const MotionState& state,
+                     const MotionLimits& limits) {
+  const MovingTarget point{
       fromInteger(anyTarget(random, state, limits, 1e6)),
       random.chance(0.3) ? 0.0 : limits.max_speed * random.within(-0.999, 0.999)};
   const double within = random.chance(0.5) ? 0.0 : random.decades(-3.0, 0.0);
-  const std::vector<Piece> pieces = joinPoint(state, point, limits, within);
+  const std::vector<Piece> pieces = planIntercept(state, point, limits, within);
   if (pieces.empty()) return {now, state.position};
   Profile profile(now, pieces);
   expectEnd(motion::endOf(pieces, state),
@@ -312,7 +312,8 @@ Profile anyCommand(Random& random, std::int64_t now, const MotionState& state,
         std::max(1e-3, limits.max_speed * random.decades(-9.0, 0.0)), random.within(-1.0, 1.0));
     return planVelocity(now, state, velocity, limits).profile;
   }
-  return which < 0.3 ? anyPursuit(random, now, state, limits) : anyMove(random, now, state, limits);
+  return which < 0.3 ? anyIntercept(random, now, state, limits)
+                     : anyMove(random, now, state, limits);
 }
 
 constexpr double kNsPerS = 1e9;

@@ -1060,7 +1060,7 @@ constexpr int kLongerStopOnCurve = 2;
 void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
   const std::vector<std::size_t>& axes = wish.axes;
   const auto snapshot = controller_->snapshot();
-  std::vector<axis::PathAxis> facts;
+  std::vector<motion::PathAxis> facts;
   Meaning meaning;
   meaning.moves = true;
   meaning.longer_stop = kLongerStopOnCurve;
@@ -1075,17 +1075,17 @@ void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
   // Forward and a little back; smooth, because an axis without a start speed can't jump.
   static constexpr std::array<double, 3> places = {0.4, 1.0, 0.7};
   static constexpr std::array<double, 3> speeds = {3.0, 0.0, 0.0};
-  std::vector<axis::TrajectoryPoint> points(places.size());
+  std::vector<motion::TrajectoryPoint> points(places.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].time = (wish.begin_in > 0 ? 0.4 : 0.25) * static_cast<double>(i + 1);
     points[i].positions.assign(axes.size(), places.at(i) * wish.size);
     points[i].velocities.assign(axes.size(), speeds.at(i) * wish.size);
     points[i].accelerations.assign(axes.size(), 0.0);
   }
-  std::shared_ptr<const axis::PreparedTrajectory> prepared;
+  std::shared_ptr<const motion::PreparedTrajectory> prepared;
   try {
     // All points have velocities, so the states at its begin don't count.
-    prepared = std::make_shared<const axis::PreparedTrajectory>(
+    prepared = std::make_shared<const motion::PreparedTrajectory>(
         facts, points, std::vector<motion::MotionState>(axes.size()));
   } catch (const Refused& refused) {
     note(std::string("the trajectory is refused: ") + refused.what());
@@ -1112,8 +1112,8 @@ void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
 
 namespace {
 
-machine::PathSegment lineTo(std::vector<double> end) {
-  machine::PathSegment segment;
+motion::PathSegment lineTo(std::vector<double> end) {
+  motion::PathSegment segment;
   segment.end = std::move(end);
   return segment;
 }
@@ -1128,7 +1128,7 @@ Meaning::Reach reachOfPath(double size, double tolerance) {
 }  // namespace
 
 void Participants::postPath(int client, const std::vector<std::size_t>& axes, double size) {
-  const machine::PathRequest request{
+  const motion::PathRequest request{
       {}, {lineTo({size, 0.0}), lineTo({size, size})}, true, 0.0, size / 10.0, true};
   followPath(client, axes, size, request);
 }
@@ -1140,18 +1140,18 @@ void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes
   constexpr double kMostSize = 0.0005;  // m
   const double begin = std::min(kMostSize, kLongest * first);
   const double end = begin + std::min(kMostSize, kLongest * second);
-  machine::PathRequest request{{}, {lineTo({begin, 0.0}), lineTo({end, 0.0})}, true};
+  motion::PathRequest request{{}, {lineTo({begin, 0.0}), lineTo({end, 0.0})}, true};
   request.segments[0].velocity = first;
   request.segments[1].velocity = second;
   followPath(client, axes, end, request);
 }
 
 void Participants::followPath(int client, const std::vector<std::size_t>& axes, double size,
-                              machine::PathRequest request) {
+                              motion::PathRequest request) {
   const auto snapshot = controller_->snapshot();
   machine::FollowTrajectory wanted{axes, nullptr, {}, machine::FollowTrajectory::Path{}};
-  std::vector<axis::PathAxis> facts;
-  std::vector<machine::PathOrigin> origins;
+  std::vector<motion::PathAxis> facts;
+  std::vector<motion::PathOrigin> origins;
   std::vector<motion::MotionState> expected;
   Meaning meaning;
   meaning.moves = true;
@@ -1168,11 +1168,11 @@ void Participants::followPath(int client, const std::vector<std::size_t>& axes, 
     meaning.reaches[axis] = reachOfPath(size, request.tolerance);
   }
   try {
-    machine::PathPlan plan = machine::planPath(request, facts, origins);
+    motion::PathPlan plan = motion::planPath(request, facts, origins);
     wanted.path->targets = plan.targets;
     wanted.path->window = plan.window;
     wanted.prepared =
-        std::make_shared<const axis::PreparedTrajectory>(facts, plan.points, expected);
+        std::make_shared<const motion::PreparedTrajectory>(facts, plan.points, expected);
   } catch (const Refused& refused) {
     return note(std::string("the path is refused: ") + refused.what());
   }
@@ -1194,8 +1194,8 @@ void Participants::followPath(int client, const std::vector<std::size_t>& axes, 
 void Participants::appendToPath(int client, std::size_t axis, double size, bool is_last) {
   const auto snapshot = controller_->snapshot();
   const auto& path = snapshot->axes.at(axis).path;
-  const auto queued = path ? std::dynamic_pointer_cast<const machine::QueuedPath>(path->shared)
-                           : std::shared_ptr<const machine::QueuedPath>();
+  const auto queued = path ? std::dynamic_pointer_cast<const motion::QueuedPath>(path->shared)
+                           : std::shared_ptr<const motion::QueuedPath>();
   if (!queued) return note("there is no path to append to");
   const pulse::Nanoseconds now = clock_.now() - engine_->state().slipped;
   constexpr pulse::Nanoseconds kAppendLead = 20'000'000;
@@ -1205,10 +1205,10 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
                                 : path->along->stateAt(now + kAppendLead).position.value();
   machine::ExtendPath wanted{axis, path->move, {queued, nullptr, passed, passed, true, {}}};
   try {
-    std::vector<machine::PathSegment> segments;
+    std::vector<motion::PathSegment> segments;
     if (size != 0.0) segments.push_back(lineTo({size, size / 2.0}));
     wanted.extension.moves_on = !segments.empty();
-    const machine::QueuedPath::Longer longer =
+    const motion::QueuedPath::Longer longer =
         queued->extended(segments, !is_last, passed, changeable);
     wanted.extension.path = longer.path;
     wanted.extension.same_from = longer.same_from;

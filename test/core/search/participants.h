@@ -248,7 +248,7 @@ class Participants : private machine::ShellCore::Host {
   void wish(int client, std::vector<std::size_t> axes, double size, pulse::Nanoseconds begin_in);
   void prepareAndPost(int client, const Wish& wish, int tries);
   void followPath(int client, const std::vector<std::size_t>& axes, double size,
-                  machine::PathRequest request);
+                  motion::PathRequest request);
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
                        int left);
   void postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,

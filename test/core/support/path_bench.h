@@ -23,8 +23,8 @@ namespace stepdriver::test {
 
 using machine::CoordinatedMove;
 using machine::CoordinatedResult;
-using machine::PathRequest;
-using machine::PathSegment;
+using motion::PathRequest;
+using motion::PathSegment;
 
 inline constexpr double kRadius = 0.020;       // m
 inline constexpr double kTolerance = 20e-6;    // m

@@ -8,8 +8,8 @@
 namespace stepdriver::test {
 
 /// @param tolerance [unit] of the corner at its end
-inline motion::ContourSegment lineTo(std::vector<double> end, double tolerance) {
-  motion::ContourSegment segment;
+inline motion::CurveSegment lineTo(std::vector<double> end, double tolerance) {
+  motion::CurveSegment segment;
   segment.end = std::move(end);
   segment.tolerance = tolerance;
   return segment;

@@ -28,8 +28,8 @@ struct PathAxisLimits {
   double jerk = 0.0;                 ///< [unit/s^3] 0: no limit
 };
 
-inline axis::PathAxis pathAxis(const std::string& name, const PathAxisLimits& given) {
-  axis::PathAxis axis;
+inline motion::PathAxis pathAxis(const std::string& name, const PathAxisLimits& given) {
+  motion::PathAxis axis;
   axis.name = name;
   axis.microsteps = 16;
   axis.steps_per_unit = given.steps_per_unit;
@@ -44,8 +44,8 @@ inline axis::PathAxis pathAxis(const std::string& name, const PathAxisLimits& gi
 using AxisSteps = std::vector<std::pair<std::int64_t, int>>;
 
 struct PlannedPath {
-  machine::PathPlan plan;
-  std::shared_ptr<const axis::SharedPath> path;
+  motion::PathPlan plan;
+  std::shared_ptr<const motion::SharedPath> path;
   std::vector<std::shared_ptr<const motion::Profile>> curves;  ///< one for each axis
 
   AxisSteps steps(std::size_t axis) const { return motion::stepsOf(*curves[axis]); }
@@ -58,24 +58,25 @@ struct PlannedPath {
 };
 
 /// The path as the machine plans it, from rest at 0.
-inline PlannedPath planned(const machine::PathRequest& request,
-                           const std::vector<axis::PathAxis>& axes) {
+inline PlannedPath planned(const motion::PathRequest& request,
+                           const std::vector<motion::PathAxis>& axes) {
   PlannedPath made;
-  made.plan = machine::planPath(request, axes, std::vector<machine::PathOrigin>(axes.size()));
+  made.plan = motion::planPath(request, axes, std::vector<motion::PathOrigin>(axes.size()));
   const std::vector<motion::MotionState> rest(axes.size());
   const auto prepared =
-      std::make_shared<const axis::PreparedTrajectory>(axes, made.plan.points, rest);
-  made.path = axis::PreparedTrajectory::join(prepared, std::vector<axis::PathStart>(axes.size()));
-  const auto& trajectory = dynamic_cast<const axis::TrajectoryPath&>(*made.path);
+      std::make_shared<const motion::PreparedTrajectory>(axes, made.plan.points, rest);
+  made.path =
+      motion::PreparedTrajectory::join(prepared, std::vector<motion::PathStart>(axes.size()));
+  const auto& trajectory = dynamic_cast<const motion::TrajectoryPath&>(*made.path);
   for (const auto& member : trajectory.members()) made.curves.push_back(member.curve);
   return made;
 }
 
 /// The same if segments are appended, and the motion may change from a time [s] on.
-inline PlannedPath fed(const PlannedPath& path, const std::vector<machine::PathSegment>& segments,
+inline PlannedPath fed(const PlannedPath& path, const std::vector<motion::PathSegment>& segments,
                        double changeable) {
-  const machine::QueuedPath queued(path.path, path.plan.window, true);
-  const machine::QueuedPath::Longer longer = queued.extended(segments, false, 0.0, changeable);
+  const motion::QueuedPath queued(path.path, path.plan.window, true);
+  const motion::QueuedPath::Longer longer = queued.extended(segments, false, 0.0, changeable);
   PlannedPath made;
   made.path = longer.path;
   const motion::Profile along = made.path->plan(0, made.path->begin(), 1.0);

@@ -13,24 +13,24 @@
 namespace stepdriver::test {
 
 /// A path with its limits; a unit is a microstep.
-struct RandomContour {
+struct RandomPath {
   std::vector<double> start;
-  std::vector<motion::ContourSegment> segments;
-  std::vector<motion::ContourLimits> limits;
+  std::vector<motion::CurveSegment> segments;
+  std::vector<motion::TimingLimits> limits;
 
-  motion::Contour contour(motion::Continuity continuity = motion::Continuity::kDirection) const {
+  motion::Path path(motion::Continuity continuity = motion::Continuity::kDirection) const {
     return {start, segments, 1.0, continuity};
   }
 };
 
-/// A contour of 1 to 4 axes and 1 to 10 segments of every shape, with ends on whole microsteps.
+/// A path of 1 to 4 axes and 1 to 10 segments of every shape, with ends on whole microsteps.
 /// Tolerances are 0, or half a microstep or more: rounding by less makes no step.
-inline RandomContour randomContour(std::mt19937& random) {
+inline RandomPath randomPath(std::mt19937& random) {
   const auto number = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   const auto chance = [&](double probability) { return number(0.0, 1.0) < probability; };
-  RandomContour made;
+  RandomPath made;
   const auto axes = static_cast<std::size_t>(number(1.0, 5.0));
   const double size = std::pow(10.0, number(1.5, 4.0));
   made.start.assign(axes, 0.0);
@@ -49,7 +49,7 @@ inline RandomContour randomContour(std::mt19937& random) {
     return to;
   };
   for (int i = 0; i < count; ++i) {
-    motion::ContourSegment segment;
+    motion::CurveSegment segment;
     segment.end = place();
     if (segment.end == from) segment.end[0] += 1.0;
     segment.tolerance = chance(0.1) ? 0.0 : tolerance;
@@ -59,13 +59,13 @@ inline RandomContour randomContour(std::mt19937& random) {
           {from[0], from[1]}, {from[0] + number(-size, size), from[1] + number(-size, size)},
           {segment.end[0], segment.end[1]});
       if (arc.angle != 0.0) {
-        segment.shape = motion::ContourSegment::Shape::kArc;
+        segment.shape = motion::CurveSegment::Shape::kArc;
         segment.plane = {0, 1};
         segment.centre = arc.centre;
         segment.angle = arc.angle;
       }
     } else if (axes > 1 && chance(0.3)) {
-      segment.shape = motion::ContourSegment::Shape::kBezier;
+      segment.shape = motion::CurveSegment::Shape::kBezier;
       segment.control1 = place();
       segment.control2 = place();
     }
@@ -76,11 +76,11 @@ inline RandomContour randomContour(std::mt19937& random) {
 }
 
 /// Puts control points of its Beziers at their ends: the first one, the second one or both.
-inline void dropHandles(RandomContour& path) {
+inline void dropHandles(RandomPath& path) {
   const std::vector<double>* from = &path.start;
   for (std::size_t i = 0; i < path.segments.size(); ++i) {
-    motion::ContourSegment& segment = path.segments[i];
-    if (segment.shape == motion::ContourSegment::Shape::kBezier) {
+    motion::CurveSegment& segment = path.segments[i];
+    if (segment.shape == motion::CurveSegment::Shape::kBezier) {
       if (i % 3 != 1) segment.control1 = *from;
       if (i % 3 != 0) segment.control2 = segment.end;
     }

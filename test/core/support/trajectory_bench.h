@@ -34,7 +34,7 @@ class TrajectoryBench : public testing::Test {
   }
 
   machine::Machine& machine() { return *bench->machine; }
-  machine::CoordinatedMove follow(const machine::TrajectoryRequest& request) {
+  machine::CoordinatedMove follow(const motion::TrajectoryRequest& request) {
     return machine().followTrajectory(request);
   }
   axis::AxisState state(const std::string& name) { return bench->axis(name).state(); }

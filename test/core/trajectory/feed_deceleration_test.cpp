@@ -14,8 +14,8 @@
 namespace stepdriver {
 namespace {
 
-using motion::BoundCourse;
 using motion::DoubleDouble;
+using motion::LimitedCurve;
 using motion::Piece;
 using motion::Profile;
 
@@ -35,19 +35,19 @@ Profile courseOf(double speed, const std::vector<double>& accelerations, double 
   return {0, std::move(pieces)};
 }
 
-BoundCourse bound(Profile course, double acceleration = kLimit) {
-  return {std::make_shared<const Profile>(std::move(course)), {acceleration, 0.0}};
+LimitedCurve bound(Profile curve, double acceleration = kLimit) {
+  return {std::make_shared<const Profile>(std::move(curve)), {acceleration, 0.0}};
 }
 
-std::optional<Profile> brake(const std::vector<BoundCourse>& courses, double from,
+std::optional<Profile> brake(const std::vector<LimitedCurve>& curves, double from,
                              double slice = kSlice, double most = kForEver) {
-  return planBraking(0, {from, 1.0, 0.0}, 0.0, courses, slice, most,
-                     courses.front().curve->duration());
+  return planFeedDeceleration(0, {from, 1.0, 0.0}, 0.0, curves, slice, most,
+                              curves.front().curve->duration());
 }
 
 /// The largest acceleration of a motor by differences over 20 us.
-double largestAcceleration(const BoundCourse& course, const Profile& path) {
-  const Profile run = composeAlong(course.curve, path);
+double largestAcceleration(const LimitedCurve& curve, const Profile& path) {
+  const Profile run = composeAlong(curve.curve, path);
   constexpr std::int64_t kStep = 20'000;
   constexpr double kSeconds = 20e-6;
   double largest = 0.0;
@@ -59,9 +59,9 @@ double largestAcceleration(const BoundCourse& course, const Profile& path) {
   return largest;
 }
 
-TEST(Braking, StopsAMotorInTheTimeThatItsSpeedTakes) {
+TEST(FeedDeceleration, StopsAMotorInTheTimeThatItsSpeedTakes) {
   // At the limit of its acceleration, and then at that of its deceleration.
-  const std::vector<BoundCourse> one = {
+  const std::vector<LimitedCurve> one = {
       bound(courseOf(500.0, {kLimit, kLimit, -kLimit, -kLimit}, 0.03))};
   for (const double from : {0.0, 0.01, 0.04, 0.055}) {
     const double ideal = (500.0 + kLimit * from) / kLimit;
@@ -72,7 +72,7 @@ TEST(Braking, StopsAMotorInTheTimeThatItsSpeedTakes) {
   }
 }
 
-TEST(Braking, IsAtRestAtItsEnd) {
+TEST(FeedDeceleration, IsAtRestAtItsEnd) {
   const std::optional<Profile> stop = brake({bound(courseOf(900.0, {0.0}, 1.0))}, 0.2);
   ASSERT_TRUE(stop);
   const Piece last = stop->pieces().back();
@@ -80,7 +80,7 @@ TEST(Braking, IsAtRestAtItsEnd) {
   EXPECT_NEAR(stop->duration().value(), 900.0 / kLimit, 1e-9);
 }
 
-// At the limit all the time, its speed is v - a t, its place v t - a t^2/2, and the course of speed
+// At the limit all the time, its speed is v - a t, its place v t - a t^2/2, and the curve of speed
 // v + c a s is at the s with that place.
 double timeToFall(double v, double change, double rate) {
   double low = 0.0;
@@ -89,17 +89,18 @@ double timeToFall(double v, double change, double rate) {
     const double t = (low + high) / 2.0;
     const double place = v * t - kLimit * t * t / 2.0;
     const double speed =
-        std::sqrt(v * v + 2.0 * change * kLimit * place);  // what the course allows there
+        std::sqrt(v * v + 2.0 * change * kLimit * place);  // what the curve allows there
     (v - kLimit * t > rate * speed ? low : high) = t;
   }
   return low;
 }
 
-TEST(Braking, FallsToALowerRateAndKeepsItToTheEnd) {
+TEST(FeedDeceleration, FallsToALowerRateAndKeepsItToTheEnd) {
   constexpr double kRate = 0.3;
   for (const double change : {0.0, -0.5, 0.5}) {
-    const std::vector<BoundCourse> one = {bound(courseOf(2000.0, {change * kLimit}, 0.09))};
-    const Profile path = *planBraking(0, {0.0, 1.0, 0.0}, kRate, one, kSlice, kForEver, 0.09);
+    const std::vector<LimitedCurve> one = {bound(courseOf(2000.0, {change * kLimit}, 0.09))};
+    const Profile path =
+        *planFeedDeceleration(0, {0.0, 1.0, 0.0}, kRate, one, kSlice, kForEver, 0.09);
     const Piece& last = path.pieces().back();
     EXPECT_EQ(last.v0, kRate);
     EXPECT_EQ(last.a, 0.0);
@@ -114,39 +115,38 @@ TEST(Braking, FallsToALowerRateAndKeepsItToTheEnd) {
   }
 }
 
-TEST(Braking, CannotBrakeAMotorThatDeceleratesAtItsLimitAlready) {
+TEST(FeedDeceleration, CannotBrakeAMotorThatDeceleratesAtItsLimitAlready) {
   EXPECT_FALSE(brake({bound(courseOf(4000.0, {-kLimit}, 0.1))}, 0.01));
 }
 
-TEST(Braking, TellsIfItTakesLongerThanIsOfUse) {
-  const std::vector<BoundCourse> even = {bound(courseOf(2000.0, {0.0}, 1.0))};
+TEST(FeedDeceleration, TellsIfItTakesLongerThanIsOfUse) {
+  const std::vector<LimitedCurve> even = {bound(courseOf(2000.0, {0.0}, 1.0))};
   EXPECT_FALSE(brake(even, 0.0, kSlice, 0.0499));
   EXPECT_TRUE(brake(even, 0.0, kSlice, 0.0501));
 }
 
-TEST(Braking, KeepsTheLimitsOfAllMotorsAndIsFasterThanEvenSlopes) {
+TEST(FeedDeceleration, KeepsTheLimitsOfAllMotorsAndIsFasterThanEvenSlopes) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   double ours = 0.0;
   double even = 0.0;
   for (int round = 0; round < 60; ++round) {
-    std::vector<BoundCourse> courses;
+    std::vector<LimitedCurve> curves;
     for (int member = 0; member < 2; ++member) {
       std::vector<double> accelerations(20);
       for (double& acceleration : accelerations) {
         acceleration = std::clamp(1.5 * part(random), -1.0, 1.0) * kLimit;
       }
-      courses.push_back(bound(courseOf(2000.0 * part(random), accelerations, 0.02)));
+      curves.push_back(bound(courseOf(2000.0 * part(random), accelerations, 0.02)));
     }
-    const std::optional<Profile> stop = brake(courses, 0.05);
+    const std::optional<Profile> stop = brake(curves, 0.05);
     if (!stop) continue;
     double time = 0.4;
     for (double slope = 1000.0; slope > 5.0; slope *= 0.9) {
-      const Profile path = motion::planRate(0, {0.05, 1.0, 0.0}, 0.0, {slope, 0.0}, 0.0, 0.4);
-      const bool keeps =
-          std::all_of(courses.begin(), courses.end(), [&](const BoundCourse& course) {
-            return staysWithin(*course.curve, path, course.bounds);
-          });
+      const Profile path = motion::planFeedRate(0, {0.05, 1.0, 0.0}, 0.0, {slope, 0.0}, 0.0, 0.4);
+      const bool keeps = std::all_of(curves.begin(), curves.end(), [&](const LimitedCurve& curve) {
+        return staysWithin(*curve.curve, path, curve.bounds);
+      });
       if (!keeps) continue;
       time = path.duration().value();
       break;
@@ -154,8 +154,8 @@ TEST(Braking, KeepsTheLimitsOfAllMotorsAndIsFasterThanEvenSlopes) {
     EXPECT_LE(stop->duration().value(), time + 2.0 * kSlice) << round;
     ours += stop->duration().value();
     even += time;
-    for (const BoundCourse& course : courses) {
-      EXPECT_LE(largestAcceleration(course, *stop), 1.01 * kLimit) << round;
+    for (const LimitedCurve& curve : curves) {
+      EXPECT_LE(largestAcceleration(curve, *stop), 1.01 * kLimit) << round;
     }
   }
   EXPECT_LT(ours, 0.6 * even);

@@ -27,16 +27,16 @@
 namespace stepdriver {
 namespace {
 
-using axis::PathAxis;
-using machine::PathRequest;
-using machine::PathSegment;
-using machine::QueuedPath;
+using motion::PathAxis;
+using motion::PathRequest;
+using motion::PathSegment;
 using motion::Profile;
+using motion::QueuedPath;
 
-std::vector<PathAxis> axesOf(const std::vector<motion::ContourLimits>& limits,
+std::vector<PathAxis> axesOf(const std::vector<motion::TimingLimits>& limits,
                              std::int64_t backlash) {
   std::vector<PathAxis> axes;
-  for (const motion::ContourLimits& limit : limits) {
+  for (const motion::TimingLimits& limit : limits) {
     PathAxis& axis = axes.emplace_back();
     axis.name = std::string("x") + std::to_string(axes.size());
     axis.backlash = backlash;
@@ -47,21 +47,21 @@ std::vector<PathAxis> axesOf(const std::vector<motion::ContourLimits>& limits,
   return axes;
 }
 
-PathRequest requestOf(const test::RandomContour& path, const std::vector<PathAxis>& axes) {
+PathRequest requestOf(const test::RandomPath& path, const std::vector<PathAxis>& axes) {
   PathRequest request;
   for (const PathAxis& axis : axes) request.names.push_back(axis.name);
-  for (const motion::ContourSegment& given : path.segments) {
+  for (const motion::CurveSegment& given : path.segments) {
     PathSegment& segment = request.segments.emplace_back();
     segment.end = given.end;
     segment.tolerance = given.tolerance;
     if (std::isfinite(given.speed)) segment.velocity = given.speed;
-    if (given.shape == motion::ContourSegment::Shape::kArc) {
+    if (given.shape == motion::CurveSegment::Shape::kArc) {
       segment.shape = PathSegment::Shape::kArcAround;
       segment.plane = {axes[0].name, axes[1].name};
       segment.point = given.centre;
       segment.clockwise = given.angle < 0.0;
     }
-    if (given.shape == motion::ContourSegment::Shape::kBezier) {
+    if (given.shape == motion::CurveSegment::Shape::kBezier) {
       segment.shape = PathSegment::Shape::kBezier;
       segment.control1 = given.control1;
       segment.control2 = given.control2;
@@ -73,13 +73,13 @@ PathRequest requestOf(const test::RandomContour& path, const std::vector<PathAxi
 
 std::shared_ptr<const QueuedPath> firstOf(const PathRequest& request,
                                           const std::vector<PathAxis>& axes) {
-  const std::vector<machine::PathOrigin> origins(axes.size());
-  const machine::PathPlan plan = machine::planPath(request, axes, origins);
+  const std::vector<motion::PathOrigin> origins(axes.size());
+  const motion::PathPlan plan = motion::planPath(request, axes, origins);
   const std::vector<motion::MotionState> expected(axes.size());
   const auto prepared =
-      std::make_shared<const axis::PreparedTrajectory>(axes, plan.points, expected);
+      std::make_shared<const motion::PreparedTrajectory>(axes, plan.points, expected);
   return std::make_shared<const QueuedPath>(
-      axis::PreparedTrajectory::join(prepared, std::vector<axis::PathStart>(axes.size())),
+      motion::PreparedTrajectory::join(prepared, std::vector<motion::PathStart>(axes.size())),
       plan.window, true);
 }
 
@@ -123,18 +123,18 @@ void expectWithin(const Profile& profile, const PathAxis& axis, double seam) {
 // The distances of a motion from the given path, of which no corner is rounded.
 class SharpPath {
  public:
-  explicit SharpPath(test::RandomContour given) {
-    for (motion::ContourSegment& segment : given.segments) {
+  explicit SharpPath(test::RandomPath given) {
+    for (motion::CurveSegment& segment : given.segments) {
       tolerance_ = std::max(tolerance_, segment.tolerance);
       segment.tolerance = 0.0;
     }
-    contour_.emplace(given.contour());
+    path_.emplace(given.path());
   }
   double tolerance() const { return tolerance_; }  // the largest
 
   double distanceTo(const std::vector<double>& place) {
     double nearest = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < contour_->size(); ++i) {
+    for (std::size_t i = 0; i < path_->size(); ++i) {
       for (std::size_t part = 0; part < kParts; ++part) {
         nearest = std::min(nearest, leastWithin(i, part, place));
       }
@@ -162,12 +162,12 @@ class SharpPath {
     return std::min({ends[0], ends[1], distanceAt(segment, low, place)});
   }
   double wayBetween(std::size_t segment, double from, double to) {
-    contour_->evaluate(segment, from, point_);
+    path_->evaluate(segment, from, point_);
     const std::vector<double> place = point_.position;
     return distanceAt(segment, to, place);
   }
   double distanceAt(std::size_t segment, double u, const std::vector<double>& place) {
-    contour_->evaluate(segment, u, point_);
+    path_->evaluate(segment, u, point_);
     double square = 0.0;
     for (std::size_t k = 0; k < place.size(); ++k) {
       square += (place[k] - point_.position[k]) * (place[k] - point_.position[k]);
@@ -175,8 +175,8 @@ class SharpPath {
     return std::sqrt(square);
   }
 
-  std::optional<motion::Contour> contour_;
-  motion::ContourPoint point_;
+  std::optional<motion::Path> path_;
+  motion::PathPoint point_;
   double tolerance_ = 0.0;
 };
 
@@ -209,8 +209,8 @@ TEST_P(RandomQueue, IsContinuousOnThePathAndKeepsLimits) {
   int paths = 0;
   double ratios = 0.0;
   for (int i = 0; i < 300; ++i) {
-    test::RandomContour given = test::randomContour(random);
-    for (motion::ContourLimits& limits : given.limits) {
+    test::RandomPath given = test::randomPath(random);
+    for (motion::TimingLimits& limits : given.limits) {
       if (!GetParam().jerk) break;
       // Accelerations that take 1 to 100 ms to build up.
       const double rate = std::pow(10.0, std::uniform_real_distribution<double>(1.0, 3.0)(random));
@@ -297,14 +297,14 @@ TEST(RandomLines, WithAJerkLimitKeepTheAccelerationAndAreNotRefused) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   for (int i = 0; i < 60; ++i) {
-    std::vector<motion::ContourLimits> limits;
+    std::vector<motion::TimingLimits> limits;
     for (int k = 0; k < 2; ++k) {
       const double acceleration = std::pow(10.0, number(3.0, 5.0));
       limits.push_back({std::pow(10.0, number(2.5, 4.5)), acceleration, acceleration,
                         acceleration * std::pow(10.0, number(1.0, 3.0))});
     }
     const std::vector<PathAxis> axes = axesOf(limits, 0);
-    test::RandomContour given;
+    test::RandomPath given;
     given.start = {0.0, 0.0};
     std::vector<double> at = given.start;
     for (int line = 0; line < 60; ++line) {

@@ -166,7 +166,7 @@ class Machine {
   /// down along the line.
   ///
   /// @throw Refused as Axis::moveTo(), and if the request is malformed; then nothing moves.
-  CoordinatedMove moveLine(const LineRequest& request);
+  CoordinatedMove moveLine(const motion::LineRequest& request);
 
   /// Moves several axes through the points of a trajectory; it can interrupt their motions. Points
   /// without velocities get those of a spline through all positions, see docs/motion.md. The
@@ -185,11 +185,11 @@ class Machine {
   /// no later; one that begins after it takes over from it.
   ///
   /// @throw Refused as moveTo(), and if a position is beyond a soft limit, a velocity by more than
-  ///   axis::kTrajectoryTolerance beyond the maximum, an acceleration beyond the larger of
+  ///   motion::kTrajectoryTolerance beyond the maximum, an acceleration beyond the larger of
   ///   acceleration and deceleration, if a velocity jumps by more than the start speed, if with a
   ///   jerk limit the jerk is beyond it or the acceleration jumps, if there is no room for the
   ///   backlash, or if one of the axes was stopped while this was planned.
-  CoordinatedMove followTrajectory(const TrajectoryRequest& request);
+  CoordinatedMove followTrajectory(const motion::TrajectoryRequest& request);
 
   /// Moves several axes along a path of lines, arcs and Beziers, from where they stand to rest at
   /// its end, as fast as their limits allow. Corners are rounded within the tolerance and passed
@@ -204,7 +204,7 @@ class Machine {
   ///   segment leads beyond a soft limit, if an arc has no circle, if a Bezier has a cusp, or if
   ///   one of the axes was stopped while this was planned; the message names the segment (the first
   ///   is 0). Then nothing moves.
-  CoordinatedMove followPath(const PathRequest& request);
+  CoordinatedMove followPath(const motion::PathRequest& request);
 
   /// How long followPath() would take for a path, at the speed override of 1. Nothing moves, and it
   /// doesn't matter whether the axes are enabled, homed, on hold or at fault.
@@ -213,7 +213,8 @@ class Machine {
   /// @return [s]
   /// @throw Refused as followPath() for the path, if `from` has another number of positions, if one
   ///   of them is beyond a soft limit, or with PathRequest::more_follows.
-  double pathDuration(const PathRequest& request, const std::vector<double>& from = {}) const;
+  double pathDuration(const motion::PathRequest& request,
+                      const std::vector<double>& from = {}) const;
 
   /// Appends segments to a path that began with PathRequest::more_follows: the axes don't stop at
   /// its former end, and the corner there is rounded, as far as they can still slow down for it. If
@@ -229,9 +230,9 @@ class Machine {
   /// @throw Refused if the axes no longer follow this path, if it is complete, if more than
   ///   kMostPathSegments would lie ahead, or as followPath() for a segment, by its number among the
   ///   appended ones. Then the path stays as it is.
-  PathAhead appendPath(const PathAppend& request);
+  motion::PathAhead appendPath(const motion::PathAppend& request);
   /// What lies ahead on such a path; empty if no axis follows it any longer.
-  std::optional<PathAhead> pathAhead(std::uint64_t path) const;
+  std::optional<motion::PathAhead> pathAhead(std::uint64_t path) const;
 
   /// How a motion of several axes ended; empty if it hasn't ended.
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace stepdriver::axis {
+namespace stepdriver::motion {
 
 /// What a trajectory wants of its axes at one time; one number for each axis, in their units.
 struct TrajectoryPoint {
@@ -20,9 +20,9 @@ struct TrajectoryPoint {
 /// Relative. A curve between points that keep to a limit may go beyond it by so much.
 constexpr double kTrajectoryTolerance = 0.01;
 
-}  // namespace stepdriver::axis
+}  // namespace stepdriver::motion
 
-namespace stepdriver::machine {
+namespace stepdriver::motion {
 
 /// A straight line of several axes. A unit is m on a linear axis, rad on a rotary one.
 struct LineRequest {
@@ -42,7 +42,7 @@ struct LineRequest {
 /// A trajectory of several axes, as Machine::followTrajectory() takes it.
 struct TrajectoryRequest {
   std::vector<std::string> names;  ///< the axes' names, each once; need not be all
-  std::vector<axis::TrajectoryPoint> points;
+  std::vector<TrajectoryPoint> points;
   /// If a limit of velocity, acceleration or jerk doesn't allow the times of the points, all times
   /// are multiplied by the smallest factor that the limits allow; velocities are divided by it,
   /// accelerations by its square. CoordinatedMove::duration is that of the slower trajectory.
@@ -136,4 +136,4 @@ struct PathAhead {
   std::vector<double> targets;  ///< [unit] the commanded positions at their end
 };
 
-}  // namespace stepdriver::machine
+}  // namespace stepdriver::motion

@@ -15,7 +15,7 @@ void ExtendPath::serve(RequestContext& machine, const SharedCall& call) const {
   const activity::Goal* goal = machine.goalOf(extended);
   if (goal == nullptr || goal->move != move) {
     extended.refuse("the path doesn't continue: " +
-                    axis::howItEnded(extended.ended_path.get(), move));
+                    motion::howItEnded(extended.ended_path.get(), move));
   }
   machine.activities.owner(extended)->extend(extension, call);
 }

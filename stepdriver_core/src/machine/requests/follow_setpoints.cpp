@@ -33,7 +33,7 @@ std::optional<activity::Goal> positionGoal(const RequestContext& machine, axis::
   setpoint.position = moved.countOf(position);
   goal.target = motion::restingCount(setpoint.position);
   goal.remainder = setpoint.position - static_cast<double>(*goal.target);
-  const axis::SetpointStream::Course course =
+  const motion::SetpointStream::Course course =
       moved.setpoints.add(setpoint.position, now, nanoseconds(timeout), moved.stops);
   setpoint.velocity = course.velocity;
   setpoint.period = static_cast<double>(course.period_ns) * 1e-9;

@@ -56,19 +56,19 @@ void FollowTrajectory::serve(RequestContext& machine, const SharedCall& call) co
     orders.push_back({moved_axes[i], machine.withOutcome(goal)});
   }
   const auto join = [prepared = prepared, moved_axes,
-                     path = path](const std::vector<axis::PathStart>& starts) {
+                     path = path](const std::vector<motion::PathStart>& starts) {
     for (std::size_t i = 0; path && i < starts.size(); ++i) {
       if (starts[i].moves || restOf(starts[i]) != path->from[i]) {
         moved_axes[i]->refuse(kMovedMeanwhile);
       }
     }
-    auto joined = axis::PreparedTrajectory::join(prepared, starts);
+    auto joined = motion::PreparedTrajectory::join(prepared, starts);
     if (!path || !path->window) return joined;
-    return std::shared_ptr<const axis::SharedPath>(
-        std::make_shared<const QueuedPath>(std::move(joined), path->window, true));
+    return std::shared_ptr<const motion::SharedPath>(
+        std::make_shared<const motion::QueuedPath>(std::move(joined), path->window, true));
   };
   if (begins_ns > 0) {
-    std::vector<axis::PathAxis> facts = prepared->axes();
+    std::vector<motion::PathAxis> facts = prepared->axes();
     return call->succeed(
         machine.activities.beginLater({std::move(orders), join, std::move(facts), begins_ns}));
   }

@@ -16,7 +16,7 @@ namespace stepdriver::machine {
 struct FollowTrajectory {
   std::vector<AxisId> axes;
   /// nullptr if something has ended the preparation: the request is refused for that, or outdated.
-  std::shared_ptr<const axis::PreparedTrajectory> prepared;
+  std::shared_ptr<const motion::PreparedTrajectory> prepared;
   /// AxisState::stops of each axis at the time of the request: if one was stopped since, it isn't
   /// begun.
   std::vector<std::uint64_t> stops;
@@ -25,7 +25,7 @@ struct FollowTrajectory {
     std::vector<double> from;     ///< [microsteps] AxisSnapshot::rest of each axis
     std::vector<double> targets;  ///< [microsteps] the commanded positions at its end
     /// If more segments follow.
-    std::shared_ptr<const PathWindow> window;
+    std::shared_ptr<const motion::PathWindow> window;
   };
   std::optional<Path> path{};
   std::int64_t begins_ns = 0;  ///< motion time at which it takes over; 0: at once

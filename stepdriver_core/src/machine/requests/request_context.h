@@ -82,7 +82,7 @@ class RequestContext {
 };
 
 /// [microsteps] Where the joint of an axis at rest is.
-inline double restOf(const axis::PathStart& start) {
+inline double restOf(const motion::PathStart& start) {
   return start.motor.position.value() - start.slack;
 }
 

@@ -42,7 +42,7 @@ class TrajectoryAction
  public:
   /// @param node the node's private handle.
   /// @param machine, queues, topics outlive the action.
-  /// @param allow_slower see machine::TrajectoryRequest.
+  /// @param allow_slower see motion::TrajectoryRequest.
   TrajectoryAction(const ros::NodeHandle& node, machine::Machine& machine, CallQueues& queues,
                    ActionTopics& topics, bool allow_slower);
   ~TrajectoryAction() override;

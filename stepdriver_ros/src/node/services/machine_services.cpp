@@ -177,7 +177,7 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
   const boost::function<bool(AppendPath::Request&, AppendPath::Response&)> append =
       [&machine](AppendPath::Request& request, AppendPath::Response& response) {
         return respond(response, [&] {
-          const machine::PathAhead ahead = machine.appendPath(
+          const motion::PathAhead ahead = machine.appendPath(
               {request.path, pathSegments(request.segments), request.more_follows != 0});
           response.target = ahead.targets;
           response.segments_ahead = static_cast<std::uint32_t>(ahead.segments);

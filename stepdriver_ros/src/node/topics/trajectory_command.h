@@ -19,7 +19,7 @@ class TrajectoryCommand {
  public:
   /// @param node the node's private handle.
   /// @param machine, queues, latched outlive the subscriber.
-  /// @param allow_slower see machine::TrajectoryRequest.
+  /// @param allow_slower see motion::TrajectoryRequest.
   TrajectoryCommand(ros::NodeHandle node, machine::Machine& machine, CallQueues& queues,
                     LatchedMessages& latched, bool allow_slower);
   TrajectoryCommand(const TrajectoryCommand&) = delete;

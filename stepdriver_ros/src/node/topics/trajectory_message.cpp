@@ -47,8 +47,8 @@ std::size_t firstPoint(const trajectory_msgs::JointTrajectory& message, double l
   return first == 1 && time(0) == 0.0 ? 0 : first;
 }
 
-axis::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point, double time) {
-  axis::TrajectoryPoint converted;
+motion::TrajectoryPoint pointOf(const trajectory_msgs::JointTrajectoryPoint& point, double time) {
+  motion::TrajectoryPoint converted;
   converted.time = time;
   converted.positions = point.positions;
   converted.velocities = point.velocities;
@@ -83,9 +83,9 @@ std::vector<std::string> axesOf(const std::vector<std::string>& joints, const Ax
   return found;
 }
 
-machine::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTrajectory& message,
-                                             const AxisOfJoint& axes, ros::Time now) {
-  machine::TrajectoryRequest request;
+motion::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTrajectory& message,
+                                            const AxisOfJoint& axes, ros::Time now) {
+  motion::TrajectoryRequest request;
   request.names = axesOf(message.joint_names, axes);
   if (message.points.empty()) throw BadTrajectory(Wrong::kInvalid, "it has no points");
   const double ahead = message.header.stamp.isZero() ? 0.0 : secondsFrom(now, message.header.stamp);
@@ -102,7 +102,7 @@ machine::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTraject
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,
                                        const AxisOfJoint& axes, bool allow_slower) {
-  machine::TrajectoryRequest request = trajectoryRequest(message, axes, ros::Time::now());
+  motion::TrajectoryRequest request = trajectoryRequest(message, axes, ros::Time::now());
   request.allow_slower = allow_slower;
   if (const std::size_t dropped = message.points.size() - request.points.size(); dropped > 0) {
     ROS_WARN_NAMED("trajectory", "The first %zu of %zu points are dropped: they are in the past",

@@ -45,12 +45,12 @@ std::vector<std::string> axesOf(const std::vector<std::string>& joints, const Ax
 /// their count.
 ///
 /// @throw BadTrajectory
-machine::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTrajectory& message,
-                                             const AxisOfJoint& axes, ros::Time now);
+motion::TrajectoryRequest trajectoryRequest(const trajectory_msgs::JointTrajectory& message,
+                                            const AxisOfJoint& axes, ros::Time now);
 
 /// Makes the machine follow a message.
 ///
-/// @param allow_slower see machine::TrajectoryRequest.
+/// @param allow_slower see motion::TrajectoryRequest.
 /// @throw BadTrajectory; Refused as Machine::followTrajectory().
 machine::CoordinatedMove followMessage(machine::Machine& machine,
                                        const trajectory_msgs::JointTrajectory& message,

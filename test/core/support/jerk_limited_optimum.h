@@ -21,7 +21,7 @@ namespace stepdriver::test {
 /// of the unused parts of all limits, with falling weights, is minimized by Newton's method, whose
 /// matrix has five diagonals. The jerk's limits aren't convex: it is an optimum among similar
 /// motions.
-class SmoothOptimum {
+class JerkLimitedOptimum {
  public:
   struct Place {
     double distance = 0.0;  ///< [unit] from the start
@@ -34,8 +34,8 @@ class SmoothOptimum {
   /// @param places the motion is at rest at the first and at the last one.
   /// @param x [unit^2/s^2] at the places: a motion to begin with, which is slowed down until it is
   ///   within the limits.
-  SmoothOptimum(std::vector<Place> places, const std::vector<motion::ContourLimits>& limits,
-                std::vector<double> x)
+  JerkLimitedOptimum(std::vector<Place> places, const std::vector<motion::TimingLimits>& limits,
+                     std::vector<double> x)
       : places_(std::move(places)), limits_(limits), x_(std::move(x)) {
     const std::size_t size = places_.size();
     for (std::size_t i = 1; i + 1 < size; ++i) {
@@ -115,7 +115,7 @@ class SmoothOptimum {
       }
       if (!take(i, 1.0 - x[i] / place.most, Three{0.0, -1.0 / place.most, 0.0})) return false;
       for (std::size_t j = 0; j < limits_.size(); ++j) {
-        const motion::ContourLimits& limits = limits_[j];
+        const motion::TimingLimits& limits = limits_[j];
         const bool forwards = place.first[j] > 0.0;
         const double most = forwards ? limits.acceleration : limits.deceleration;
         const double least = forwards ? limits.deceleration : limits.acceleration;
@@ -238,7 +238,7 @@ class SmoothOptimum {
   }
 
   std::vector<Place> places_;
-  const std::vector<motion::ContourLimits>& limits_;
+  const std::vector<motion::TimingLimits>& limits_;
   std::vector<double> x_;
   std::vector<Three> slope_;  // that of x at the places between the ends, from its neighbours
   std::vector<Three> bend_;
