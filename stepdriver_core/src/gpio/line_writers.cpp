@@ -17,7 +17,17 @@ struct LineWriters::Shared {
   std::mutex mutex;
   std::function<void()> told;  // empty: nobody listens anymore
   std::function<void(const LineWrite&)> written;
+  std::vector<bool> safe_levels;  // by output
   std::vector<Done> done;
+
+  /// Unlocks the mutex while the line is written. @return 0 or errno.
+  int write(const LineWrite& write, std::unique_lock<std::mutex>& lock) {
+    lock.unlock();
+    const int error = lines->write(&write, 1);
+    lock.lock();
+    if (error == 0 && written) written(write);
+    return error;
+  }
 };
 
 struct LineWriters::Chip {
@@ -26,14 +36,21 @@ struct LineWriters::Chip {
   bool ending = false;
   bool ended = false;
   std::thread thread;
+
+  bool awaitsWriteOf(int output) const {
+    return std::any_of(jobs.begin(), jobs.end(),
+                       [output](const Job& job) { return job.write.output == output; });
+  }
 };
 
-LineWriters::LineWriters(std::shared_ptr<Lines> lines, bool threaded, std::int64_t timeout_ns,
-                         std::function<void()> told, std::function<void(const LineWrite&)> written)
+LineWriters::LineWriters(std::shared_ptr<Lines> lines, std::vector<bool> safe_levels, bool threaded,
+                         std::int64_t timeout_ns, std::function<void()> told,
+                         std::function<void(const LineWrite&)> written)
     : threaded_(threaded), timeout_ns_(timeout_ns), shared_(std::make_shared<Shared>()) {
   shared_->lines = std::move(lines);
   shared_->told = std::move(told);
   shared_->written = std::move(written);
+  shared_->safe_levels = std::move(safe_levels);
 }
 
 LineWriters::~LineWriters() {
@@ -95,17 +112,17 @@ void LineWriters::run(const std::shared_ptr<Shared>& shared, const std::shared_p
     chip->changed.wait(lock, [&chip] { return chip->ending || !chip->jobs.empty(); });
     if (chip->jobs.empty()) break;
     const Job job = chip->jobs.front();
-    int error = ETIMEDOUT;
-    // Writes that waited behind one that hung are dropped.
-    if (!job.told) {
-      lock.unlock();
-      error = shared->lines->write(&job.write, 1);
-      lock.lock();
-      if (error == 0 && shared->written) shared->written(job.write);
-    }
+    // A write that timed out while it waited behind another one isn't made.
+    const int error = job.told ? ETIMEDOUT : shared->write(job.write, lock);
     const bool told = chip->jobs.front().told;
     chip->jobs.pop_front();
-    if (told) continue;
+    if (told) {
+      const int output = job.write.output;
+      const bool safe = shared->safe_levels[static_cast<std::size_t>(output)];
+      // Nobody learns whether this succeeds: the write has been reported as failed.
+      if (!chip->awaitsWriteOf(output)) (void)shared->write({output, safe}, lock);
+      continue;
+    }
     shared->done.push_back({job.id, error});
     if (shared->told) shared->told();
   }

@@ -18,6 +18,9 @@ namespace stepdriver::gpio {
 
 /// Writes the lines that the pulse thread doesn't time. Each GPIO chip has a thread of its own, so
 /// that a chip that hangs delays only itself. Writes to one chip keep their order.
+///
+/// A write that has timed out counts as failed, but it can't be recalled. When its chip answers
+/// again, the line therefore gets its safe level, unless a write that is still awaited follows.
 class LineWriters {
  public:
   /// A write that has ended.
@@ -27,12 +30,14 @@ class LineWriters {
   };
 
   /// @param threaded false: write() writes at once.
+  /// @param safe_levels of all outputs, see OutputRequest.
   /// @param timeout_ns on the steady clock: a write that takes longer counts as failed.
   /// @param told called from the thread that has written when there is something to collect.
   /// @param written called after each write that succeeded, also after its timeout: one call at a
   ///   time, from any writing thread. May be empty.
-  LineWriters(std::shared_ptr<Lines> lines, bool threaded, std::int64_t timeout_ns,
-              std::function<void()> told, std::function<void(const LineWrite&)> written = {});
+  LineWriters(std::shared_ptr<Lines> lines, std::vector<bool> safe_levels, bool threaded,
+              std::int64_t timeout_ns, std::function<void()> told,
+              std::function<void(const LineWrite&)> written = {});
   /// Threads whose write hangs are abandoned; they keep the lines.
   ~LineWriters();
   LineWriters(const LineWriters&) = delete;

@@ -47,9 +47,7 @@ std::vector<bool> levelsOf(const Wiring& wiring) {
                     "recorder/seconds to 0",
                     wiring.outputs.size(), pulse::PinRing::kMostOutputs));
   }
-  std::vector<bool> levels;
-  for (const gpio::OutputRequest& output : wiring.outputs) levels.push_back(output.safe_level);
-  return levels;
+  return wiring.safeLevels();
 }
 
 void addPins(const config::AxisConfig& axis, std::size_t motor, const motor::MotorLines& all_lines,

@@ -96,8 +96,7 @@ class Machine::Impl {
       if (on_io_) on_io_(states);
     };
     shell_options.recorder = recorder_.get();
-    shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring.inputs.size(),
-                                     shell_options);
+    shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring, shell_options);
     for (std::size_t i = 0; i < configs.size(); ++i) {
       auto axis = std::make_unique<MachineAxis>(configs[i], i, wiring.motor_lines[i], *shell_,
                                                 *lines_, names_);

@@ -50,23 +50,24 @@ bool motionBegins(const MachineSnapshot& before, const MachineSnapshot& now) {
 }  // namespace
 
 Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
-             std::shared_ptr<gpio::Lines> lines, std::size_t inputs, const Options& options)
+             std::shared_ptr<gpio::Lines> lines, const Wiring& wiring, const Options& options)
     : controller_(controller),
       engine_(engine),
       clock_(clock),
       lines_(std::move(lines)),
-      has_inputs_(inputs > 0),
+      has_inputs_(!wiring.inputs.empty()),
       threaded_(options.threaded),
       on_motion_(options.on_motion),
       on_io_(options.on_io),
       most_looks_in_vain_(std::max(clock.realtime() ? kFewestLooks : kFewestLooksOnRig,
                                    options.write_timeout_ns / kLookPeriodNs)),
       writers_(
-          lines_, options.threaded, options.write_timeout_ns, [this] { wakeUp(); },
+          lines_, wiring.safeLevels(), options.threaded, options.write_timeout_ns,
+          [this] { wakeUp(); },
           [this, recorder = options.recorder](const gpio::LineWrite& write) {
             if (recorder != nullptr) recorder->addWrite(write, clock_.now());
           }),
-      core_(controller, engine, clock, lines_, inputs, *this, options.recorder),
+      core_(controller, engine, clock, lines_, wiring.inputs.size(), *this, options.recorder),
       snapshot_(core_.snapshot()) {
   engine_.listen(*this);
   if (!threaded_) return;

@@ -20,6 +20,7 @@
 #include "shell_core.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "wiring.h"
 
 namespace stepdriver::machine {
 
@@ -42,9 +43,9 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
     FlightRecorder* recorder = nullptr;  ///< outlives the shell; nullptr: nothing is recorded
   };
 
-  /// @param controller, engine, clock outlive the shell.
+  /// @param controller, engine, clock outlive the shell. @param wiring what the lines are.
   Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& clock,
-        std::shared_ptr<gpio::Lines> lines, std::size_t inputs, const Options& options);
+        std::shared_ptr<gpio::Lines> lines, const Wiring& wiring, const Options& options);
   /// Calls stop() if that wasn't called.
   ~Shell() override;
 

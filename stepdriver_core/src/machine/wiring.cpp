@@ -89,6 +89,12 @@ pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes) {
   return nanoseconds(1.1 * longest + 0.1);
 }
 
+std::vector<bool> Wiring::safeLevels() const {
+  std::vector<bool> levels;
+  for (const gpio::OutputRequest& output : outputs) levels.push_back(output.safe_level);
+  return levels;
+}
+
 pulse::Capability measure(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                           pulse::Clock& clock, const pulse::RealtimeRequest& request) {
   config::checkAxes(axes);

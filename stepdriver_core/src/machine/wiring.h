@@ -31,6 +31,9 @@ struct Wiring {
   std::vector<int> named_outputs;  // in the order of MachineOptions::outputs
   std::vector<int> named_inputs;
 
+  /// Of all outputs, see gpio::OutputRequest.
+  std::vector<bool> safeLevels() const;
+
   /// @param options those that it was made of.
   activity::MotorPower motorPower(const MachineOptions& options) const {
     if (!motor_power) return {};
