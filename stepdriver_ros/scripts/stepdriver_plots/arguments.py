@@ -5,9 +5,8 @@ import math
 import pathlib
 import sys
 
-from .figure import FORMATS
-
 WRONG_USAGE = 64  # the exit code of all commands of this package
+FORMATS = ("svg", "png")  # of pictures
 
 
 class Parser(argparse.ArgumentParser):

@@ -31,7 +31,6 @@ matplotlib.rcParams.update({
     "path.simplify_threshold": 0.3,
 })
 COLOURS = ["#1f6fb4", "#d9661f", "#2b8a3e", "#8a3ea8", "#7a6a20", "#555555"]
-FORMATS = ("svg", "png")
 # The times of edges are whole nanoseconds. With this many samples, their third differences stay above
 # the noise.
 SAMPLES = 250
