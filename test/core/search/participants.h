@@ -118,6 +118,8 @@ class Participants : private machine::ShellCore::Host {
   std::vector<std::string> run();
 
   std::size_t steps() const { return steps_; }
+  /// @param hash is given all edges; it outlives this.
+  void hashTo(EdgeHash& hash) { trace_->hash = &hash; }
   /// From now on, writes down each step.
   void keepLog() { log_ = true; }
   const std::vector<std::string>& log() const { return lines_of_log_; }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +14,23 @@
 
 namespace stepdriver::search {
 
+/// What all edges of some runs were, in one number (FNV-1a): it tells whether a change has moved any
+/// of them.
+class EdgeHash {
+ public:
+  void add(std::uint64_t value) {
+    for (int byte = 0; byte < 8; ++byte, value >>= 8U) {
+      hash_ = (hash_ ^ (value & 0xFFU)) * 0x100000001B3U;
+    }
+    ++values_;
+  }
+  std::string text() const { return fmt::format("{} values, hash {:016x}", values_, hash_); }
+
+ private:
+  std::uint64_t hash_ = 0xCBF29CE484222325U;
+  std::uint64_t values_ = 0;
+};
+
 /// Reports each rising STEP edge of the rig, with the number of its axis, and counts them. The
 /// chips are A4988s.
 class RiseWatch : public sim::PinTrace {
@@ -21,6 +40,7 @@ class RiseWatch : public sim::PinTrace {
   }
 
   std::function<void(std::size_t axis, std::int64_t time_ns)> rose;
+  EdgeHash* hash = nullptr;  ///< is given all edges
 
   /// [1/16 steps] Where the pulses have taken the motor of an axis.
   std::int64_t place(std::size_t axis) const { return motors_.at(axis).place; }
@@ -38,6 +58,10 @@ class RiseWatch : public sim::PinTrace {
   }
 
   void edge(int pin, bool level, std::int64_t time_ns) override {
+    if (hash != nullptr) {
+      hash->add(static_cast<std::uint64_t>(time_ns));
+      hash->add(static_cast<std::uint64_t>(2 * pin + (level ? 1 : 0)));
+    }
     const Pin& changed = pins_[static_cast<std::size_t>(pin)];
     if (changed.role == Role::kOther) return;
     if (changed.role != Role::kStep) return set(changed, level);
