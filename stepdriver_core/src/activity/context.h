@@ -44,7 +44,12 @@ struct Outputs {
 /// the outputs.
 class Context : public AnswerSink {
  public:
-  explicit Context(std::size_t inputs) : levels(inputs) {}
+  /// @param port_horizon of the port that plays the steps.
+  explicit Context(std::size_t inputs, pulse::Nanoseconds port_horizon = 0)
+      : horizon(port_horizon), levels(inputs) {}
+
+  /// See pulse::StepPort::horizon(): a new profile begins later than this from now.
+  const pulse::Nanoseconds horizon;
 
   axis::MachineMode mode;
   axis::InputLevels levels;

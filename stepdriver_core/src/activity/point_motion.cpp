@@ -220,12 +220,13 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
 std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
                            pulse::Nanoseconds lead) {
   const pulse::Nanoseconds now = context.motionNow();
+  const pulse::Nanoseconds first = now + context.horizon + lead;
   if (const motor::Motion* before = axis.motor.motions().latest()) {
-    return std::max(now + lead, before->planned.plan()->startNs());
+    return std::max(first, before->planned.plan()->startNs());
   }
   // DIR is set when the profile is accepted, and the chip may still be waking up.
   const pulse::Nanoseconds dir = axis.turnTime();
-  return std::max(now + lead + dir, now + (axis.motor.state().ready - context.now) + dir);
+  return std::max(first + dir, now + (axis.motor.state().ready - context.now) + dir);
 }
 
 std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {

@@ -11,7 +11,8 @@
 
 namespace stepdriver::activity {
 
-/// How far in the future a profile begins at first: time to plan it and to hand it over.
+/// How far beyond the port's horizon a profile begins at first: time to plan it and to hand it
+/// over.
 constexpr pulse::Nanoseconds kLead = 1'000'000;
 
 /// The plan for a goal of one axis, and the limits that it keeps, see motor::Motion.
@@ -53,6 +54,8 @@ std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goa
 motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at);
 
 /// The first motion time at which a new profile of an axis may begin.
+///
+/// @param lead the time to plan it and to hand it over.
 std::int64_t earliestStart(const Context& context, const axis::AxisModel& axis,
                            pulse::Nanoseconds lead);
 

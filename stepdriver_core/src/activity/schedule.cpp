@@ -229,11 +229,11 @@ std::vector<axis::AxisModel*> Schedule::toWake() const {
   return axes;
 }
 
-// DIR may have to be set when the order is taken.
+// DIR may have to be set when the order is taken, and the port takes steps before their times.
 pulse::Nanoseconds Schedule::lead(const Entry& entry) const {
   pulse::Nanoseconds turn = 0;
   for (const Order& order : entry.motion.orders) turn = std::max(turn, order.axis->turnTime());
-  return kAhead + turn;
+  return kAhead + turn + context_.horizon;
 }
 
 std::optional<Schedule::Due> Schedule::takeDue() {

@@ -35,8 +35,8 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
                        const std::vector<motor::MotorLines>& lines, axis::LineNames names,
                        const std::optional<pulse::Signal>& emergency_stop,
                        EmergencyDisable emergency_disable, activity::MotorPower motor_power,
-                       NamedLines named)
-    : context_(names.inputs.size()),
+                       NamedLines named, pulse::Nanoseconds horizon)
+    : context_(names.inputs.size(), horizon),
       activities_(context_),
       requests_(context_, activities_, emergency_stop, std::move(named)),
       io_(std::make_shared<const IoStates>(requests_.named.states())),

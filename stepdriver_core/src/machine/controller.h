@@ -18,10 +18,12 @@ namespace stepdriver::machine {
 /// file: its outputs are a function of its inputs and their order.
 class Controller {
  public:
+  /// @param horizon of the engine, see pulse::PulseEngine::horizon().
   Controller(const std::vector<config::AxisConfig>& axes,
              const std::vector<motor::MotorLines>& lines, axis::LineNames names,
              const std::optional<pulse::Signal>& emergency_stop, EmergencyDisable emergency_disable,
-             activity::MotorPower motor_power = {}, NamedLines named = {});
+             activity::MotorPower motor_power = {}, NamedLines named = {},
+             pulse::Nanoseconds horizon = 0);
   ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;

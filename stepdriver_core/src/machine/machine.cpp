@@ -73,7 +73,7 @@ class Machine::Impl {
                                                    wiring.emergency_stop, wiring.shared);
     controller_ = std::make_unique<Controller>(
         configs, wiring.motor_lines, names_, wiring.emergency_stop, options.emergency_disable,
-        wiring.motorPower(options), wiring.namedLines(options));
+        wiring.motorPower(options), wiring.namedLines(options), engine_->horizon());
     if (options.emergency_disable == EmergencyDisable::kRamp) {
       engine_->rampStops(longestRamp(configs));
     }
@@ -250,7 +250,8 @@ class Machine::Impl {
 
   // Replaces the path by a longer one, from some time ahead on; later if that was too soon.
   motion::PathAhead appendPath(const motion::PathAppend& request) {
-    pulse::Nanoseconds lead = kLeastLead;
+    const pulse::Nanoseconds least_lead = engine_->horizon() + kLeastLead;
+    pulse::Nanoseconds lead = least_lead;
     for (int i = 0;; ++i) {
       const pulse::Nanoseconds began = clock_.now();
       const auto snapshot = shell_->snapshot();
@@ -283,7 +284,7 @@ class Machine::Impl {
       const bool outdated =
           reply.failure && reply.failure->kind == activity::Failure::Kind::kOutdated;
       if (outdated && i < kMostExtensions + kMostPreparations) {
-        lead = kLeastLead + 2 * (clock_.now() - began);
+        lead = least_lead + 2 * (clock_.now() - began);
         continue;
       }
       valueOf(reply);

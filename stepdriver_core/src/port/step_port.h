@@ -33,12 +33,39 @@ class PinRing;
 /// thread keeps what it has to tell until serve() is called, and wakes the clock so that it is.
 class StepPort {
  public:
+  /// Lanes, a bit for each: the first one's is the lowest.
+  using LaneSet = std::uint64_t;
+  static constexpr std::size_t kMostLanes = 64;  ///< of a port with a horizon
+  static LaneSet laneBit(std::size_t lane) { return LaneSet{1} << lane; }
+
   /// A step of a channel.
   struct Step {
     std::size_t channel = 0;
     int direction = 0;     ///< +1 or -1
     Nanoseconds time = 0;  ///< at which it is planned
     MotorSet still = 0;    ///< motors of the channel that don't take part
+    /// For ports with a horizon: the lanes of the axes that it moves towards max, and towards min.
+    /// Those are the channel's own, or those of the axes that share its motor.
+    /// @{
+    LaneSet forward = 0;
+    LaneSet backward = 0;
+    /// @}
+  };
+
+  /// For ports with a horizon: how the motors of an axis make a motion, see Follow.
+  struct Squaring {
+    MotorSet still = 0;      ///< these make no steps
+    bool squares = false;    ///< each stops at its own switch, and the others continue
+    bool is_square = false;  ///< their skew counts from here
+  };
+
+  /// A condition that a step didn't fulfil.
+  struct Stop {
+    EndReason reason = EndReason::kDone;
+    std::size_t lane = 0;   ///< whose input it was
+    std::size_t motor = 0;  ///< of that lane
+    LineFailure failure;    ///< for kLineError
+    MotorSet still = 0;     ///< the motors that have stopped at their own switches
   };
 
   /// What the engine must know of a channel to put its next step. Written by the port only, in
@@ -60,7 +87,8 @@ class StepPort {
    public:
     virtual ~Listener() = default;
 
-    /// The oldest open step of a channel has gone out on all motors but those that are still.
+    /// The oldest open step of a channel has gone out on all motors but those that are still. A
+    /// port with a horizon says so when its pulse has ended.
     ///
     /// @param time by which it had happened; the lane still tells of the step before it.
     virtual void played(std::size_t channel, int direction, MotorSet still, Nanoseconds time) = 0;
@@ -70,10 +98,7 @@ class StepPort {
     virtual void givenBack(std::size_t channel, std::size_t steps) = 0;
     /// A condition of the port's own has stopped the channel: no open step of it will be played,
     /// and all are given back. Only for ports with a horizon.
-    ///
-    /// @param still the motors that have stopped at their own switches in a motion that squares.
-    virtual void stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
-                         MotorSet still) = 0;
+    virtual void stopped(std::size_t channel, const Stop& stop) = 0;
     /// A line of a channel could not be written. A step that was to go out may have gone out, and
     /// counts as given back; or the lane hasn't turned. All steps that are still open are given
     /// back too.
@@ -96,11 +121,22 @@ class StepPort {
   /// the planner needs to make and hand over a profile comes in addition.
   ///
   /// 0: the port writes now. A step is played in the serve() after its put(), and is over then.
-  /// Whoever puts it asks the guards first, so it doesn't know any. Otherwise the port keeps the
-  /// guards' conditions until the step is played: no step goes out to a motor whose switch in that
-  /// direction, or whose chip's fault output, is active by its ChannelConfig. A step that a
-  /// condition forbids stops the channel.
+  /// Whoever puts it asks the guards first, so it doesn't know any.
+  ///
+  /// Otherwise the port keeps the guards' conditions until the step is played, and a step that one
+  /// forbids stops the channel:
+  /// - No step goes out while a switch of an axis in Step::forward or Step::backward is active at
+  ///   that end, or can't be read.
+  /// - In a motion that squares, a motor whose own switch is active becomes still instead. The
+  ///   channel stops when all its motors are still, or as EndReason::kSkewed before the counts of
+  ///   two get further apart than ChannelConfig::max_skew.
+  /// - No step goes out to a motor whose chip's fault output is active, unless
+  ///   ChannelConfig::ramps_at_fault.
+  /// Channels that end together with a stopped one play on until their steps are taken back.
   virtual Nanoseconds horizon() const = 0;
+
+  /// A motion of an axis begins from rest. @pre No step of it is open.
+  virtual void begin(std::size_t /*channel*/, const Squaring& /*squaring*/) {}
 
   /// The direction of the next step, if the lane doesn't accept it; 0: none is to be expected.
   /// @pre The lane isn't busy, and no step of it is open.
@@ -113,8 +149,8 @@ class StepPort {
 
   /// Drops all open steps of a channel at once, for the end of a motion, whatever its speed. A
   /// pulse that is out ends as usual. What hasn't been played is given back: by a port that writes
-  /// now in this call, without a word; by others as soon as the hardware has answered. No step of
-  /// the channel may be put while one is open.
+  /// now in this call, without a word; by others as soon as the hardware has answered, which plays
+  /// what is due until then. No step of the channel may be put while one is open.
   virtual void takeBack(std::size_t channel) = 0;
 
   /// Does what is due, and tells the listener what has happened since the last call. @param now

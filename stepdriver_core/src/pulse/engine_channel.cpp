@@ -30,6 +30,11 @@ bool Kin::isBusy() const {
 }
 
 // The n-th motor has the chip of the n-th axis, and its channel comes after those of all axes.
+EngineChannel* Kin::axisOf(EngineChannel& channel) {
+  const auto place = std::find(all.begin(), all.end(), &channel) - all.begin();
+  return axes[static_cast<std::size_t>(place) % axes.size()];
+}
+
 void SumKin::stepped(EngineChannel& channel, const PlayedStep& step) {
   channel.publishStep(step);
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -69,12 +74,41 @@ void EngineChannel::follow(const Follow& order) {
   const bool settles = order.settles && guard.has(&MotorSignals::in_position);
   motion->follow({order.profile, order.serial, settles},
                  {order.restart_interval, config.late_steps * order.full_step});
-  if (from_rest) adopted();
+  if (from_rest) adopted(true);
 }
 
-void EngineChannel::adopted() {
-  state.following = motion->following();
+// Channels of its kin may have more steps after its end.
+void EngineChannel::noteLastSteps() {
+  if (!motion->endsAt()) return last_steps_.clear();
+  if (!last_steps_.empty()) return;
+  for (const EngineChannel* channel : kin->all) last_steps_.push_back(channel->put);
+}
+
+bool EngineChannel::isPlayed() const {
+  for (std::size_t i = 0; i < last_steps_.size(); ++i) {
+    if (kin->all[i]->over < last_steps_[i]) return false;
+  }
+  return !last_steps_.empty();
+}
+
+void EngineChannel::adopted(bool told) {
+  last_steps_.clear();
+  if (told) {
+    state.following = motion->following();
+  } else {
+    if (untold_.size() == kMostUntold) tell(untold_.front().start);
+    untold_.push_back({motion->following(), motion->profile().startNs()});
+  }
   guard.adopted(motion->next().has_value() || kin->all.size() > 1);
+}
+
+void EngineChannel::tell(Nanoseconds motion_now) {
+  const auto later = std::find_if(untold_.begin(), untold_.end(), [motion_now](const Untold& one) {
+    return one.start > motion_now;
+  });
+  if (later == untold_.begin()) return;
+  state.following = (later - 1)->serial;
+  untold_.erase(untold_.begin(), later);
 }
 
 void EngineChannel::release(const Command& command) {
@@ -120,6 +154,7 @@ void EngineChannel::endMotion(EndReason reason, bool abrupt, Nanoseconds motion_
     state.end_time = motion_now;
   }
   state.following = 0;
+  untold_.clear();
   state.rests_at = motion->restsAt();
   motion->end();
   guard.end();

@@ -42,6 +42,8 @@ class Kin {
   bool isRunning() const;   ///< such a motion has made a step
   bool isReserved() const;  ///< the pins of a chip are being written
   bool isBusy() const;      ///< a pulse is out, or a step is open
+  /// The axis whose chip has the motor of a channel: that of an axis itself.
+  EngineChannel* axisOf(EngineChannel& channel);
 
   std::vector<EngineChannel*> axes;  ///< what objects to a step, or ends, is theirs
   std::vector<EngineChannel*> all;   ///< a step of one may be what another one waits for
@@ -49,6 +51,7 @@ class Kin {
   bool ends = false;                 ///< they are being ended
   std::size_t open = 0;              ///< steps that a port with a horizon has, and hasn't played
   bool drains = false;               ///< they have ended early, and steps are still open
+  bool unmade = false;  ///< with a horizon: they have ended before a step that was planned
 };
 
 /// The pulse thread's state of one channel: what comes next on it (timeline), whether that may go
@@ -82,8 +85,9 @@ struct EngineChannel {
   void publish() { kin->drains ? published.storeFirst<kStepBytes>(state) : published.store(state); }
   void follow(const Follow& order);
   void release(const Command& command);
-  /// Another profile is followed.
-  void adopted();
+  /// Another profile is followed. @param told whether to say so at once: the steps of the one
+  ///   before it have been played.
+  void adopted(bool told);
   /// A step has gone out. @pre The axis has motors of its own.
   void publishStep(const PlayedStep& step);
   void endMotion(EndReason reason, bool abrupt, Nanoseconds motion_now);
@@ -97,16 +101,48 @@ struct EngineChannel {
   Kin* kin = nullptr;
   EngineChannel* next_of_kin = this;  // a ring through all of them
 
-  std::uint64_t group = 0;      // the last order's; 0: no group
-  bool slows = false;           // the last order brings it to rest
-  bool changed = false;         // it must be scheduled
-  Nanoseconds fast_until = -1;  // time of the last step that was put at a speed that nextIsFast()
-  Nanoseconds late = 0;         // how late the next step is so far
-  Nanoseconds behind = 0;       // overdue() of the last step when its write had ended
+  std::uint64_t group = 0;  // the last order's; 0: no group
+  bool slows = false;       // the last order brings it to rest
+  bool changed = false;     // it must be scheduled
+  Nanoseconds at = 0;       // clock time of the next step
+  Nanoseconds late = 0;     // how late the next step is so far
+  Nanoseconds behind = 0;   // overdue() of the last step when its write had ended
   Snapshot<ChannelState> published;
+
+  /// @name With a port that has a horizon
+  /// @{
+  /// Notes which steps must be over before its profile has ended, once the timeline has made them.
+  void noteLastSteps();
+  void reserve() {
+    last_steps_.reserve(kin->all.size());
+    untold_.reserve(kMostUntold);
+  }
+  /// These steps are over.
+  bool isPlayed() const;
+  /// When the next profile begins that is followed and hasn't been told; kNever: there is none.
+  Nanoseconds tellAt() const { return untold_.empty() ? kNever : untold_.front().start; }
+  /// Tells which profile is played at a motion time.
+  void tell(Nanoseconds motion_now);
+
+  std::uint64_t put = 0;     // its steps that were handed over
+  std::uint64_t over = 0;    // those of them that were played or given back
+  bool is_fast = false;      // the motor can't stop at once after the last step that was played
+  bool ended_early = false;  // and steps of its kin are still open
+                             /// @}
 
  private:
   void takeUp(double of_backlash);
+
+  struct Untold {
+    std::uint64_t serial = 0;
+    Nanoseconds start = 0;  // motion time
+  };
+  // One a millisecond for the longest horizon that is to be expected. If there are more, the oldest
+  // ones are told too early.
+  static constexpr std::size_t kMostUntold = 64;
+
+  std::vector<std::uint64_t> last_steps_;  // EngineChannel::put of its kin's channels, or empty
+  std::vector<Untold> untold_;             // in the order of their starts
 };
 
 /// The channels of axes that share motors, and of these motors.

@@ -1,10 +1,13 @@
 #include "pulse/pulse_engine.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
 #include "engine_channel.h"
 #include "port/gpio_port.h"
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::pulse {
 
@@ -43,17 +46,21 @@ ChannelConfig motorOf(const ChannelConfig& axis) {
   return motor;
 }
 
+bool anyRamps(const std::vector<ChannelConfig>& channels, const SharedAxes& shared) {
+  return std::any_of(shared.channels.begin(), shared.channels.end(),
+                     [&](std::size_t axis) { return channels.at(axis).ramps_at_fault; });
+}
+
 // Axes that share motors need all of their chips to be in order.
 std::vector<ChannelConfig> withSharedChips(std::vector<ChannelConfig> channels,
                                            const std::vector<SharedAxes>& shared) {
   const std::vector<ChannelConfig> given = channels;
   for (const SharedAxes& axes : shared) {
     Nanoseconds timeout = 0;
-    bool ramps = false;
     for (const std::size_t axis : axes.channels) {
       timeout = std::max(timeout, given.at(axis).in_position_timeout);
-      ramps = ramps || given.at(axis).ramps_at_fault;
     }
+    const bool ramps = anyRamps(given, axes);
     for (const std::size_t axis : axes.channels) {
       channels[axis].in_position_timeout = timeout;
       channels[axis].ramps_at_fault = ramps;
@@ -121,6 +128,11 @@ PulseEngine::PulseEngine(StepPort* port, gpio::Lines& lines, Clock& clock,
   for (const auto& kin : kins_) {
     kin->guarded = std::any_of(kin->axes.begin(), kin->axes.end(),
                                [](const Channel* axis) { return !axis->guard.isIdle(); });
+    for (Channel* axis : kin->axes) axis->reserve();
+  }
+  if (horizon_ != 0 && port_.lanes() > StepPort::kMostLanes) {
+    throw Refused(fmt::format("a port with a horizon has {} lanes, but may have {} at most",
+                              port_.lanes(), StepPort::kMostLanes));
   }
   port_.listen(*this);
   due_.reserve(channels_.size());
@@ -132,7 +144,12 @@ std::vector<ChannelConfig> PulseEngine::lanesOf(std::vector<ChannelConfig> chann
                                                 const std::vector<SharedAxes>& shared) {
   const std::vector<ChannelConfig> given = channels;
   for (const SharedAxes& axes : shared) {
-    for (const std::size_t axis : axes.channels) channels.push_back(motorOf(given.at(axis)));
+    const bool ramps = anyRamps(given, axes);
+    for (const std::size_t axis : axes.channels) {
+      channels.push_back(motorOf(given.at(axis)));
+      channels.back().fault = given[axis].fault;
+      channels.back().ramps_at_fault = ramps;
+    }
   }
   return channels;
 }
@@ -197,15 +214,17 @@ Nanoseconds PulseEngine::serve() {
       inputs_changed_.exchange(false, std::memory_order_acquire)) {
     readInputs(now);
   }
-  if (dues_.earliest() <= now) putSteps(now);
+  if (dues_.earliest() <= now) horizon_ == 0 ? putSteps(now) : fillPort(now);
   if (port_.due() <= now || horizon_ != 0) servePort(now);
   scheduleChanged();
+  if (horizon_ != 0) tellFollowed(now);
   if (std::min(dues_.earliest(), port_.due()) <= now) finishDue(now);
   if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
   serveStops();
   report();
   const Nanoseconds steps_due = std::min(dues_.earliest(), port_.due());
-  const Nanoseconds due = std::min(steps_due, stops_.due([this] { return allSlow(); }));
+  Nanoseconds due = std::min(steps_due, stops_.due([this] { return allSlow(); }));
+  if (horizon_ != 0) due = std::min(due, tellDue());
   return heartbeat_ ? std::min(due, heartbeat_->due()) : due;
 }
 
@@ -261,6 +280,9 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
   for (std::size_t i = 0; may && i < command.follow_count; ++i) {
     const Follow& order = command.follows[i];
     Channel& channel = *channels_[static_cast<std::size_t>(order.channel)];
+    if (horizon_ != 0 && !channel.motion->follows()) {
+      port_.begin(channel.index, {order.still, order.squares, order.is_square});
+    }
     channel.follow(order);
     channel.state.accepted = order.serial;
     changed(channel);
@@ -402,7 +424,7 @@ inline void PulseEngine::collectDue(Nanoseconds now) {
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
     if (!channel.canStep()) continue;
-    const Nanoseconds late = now - dues_[index] - horizon_;
+    const Nanoseconds late = now - channel.at;
     const Nanoseconds motion_now = now - state_.slipped;
     const Nanoseconds lag = motion_now - channel.motion->next()->time_ns;
     const Nanoseconds worst = std::max({late, channel.overdue(now), channel.behind});
@@ -427,9 +449,12 @@ void PulseEngine::putSteps(Nanoseconds now) {
   for (const std::size_t index : due_) {
     Channel& channel = *channels_[index];
     if (!channel.canStep() || !mayStep(channel, now)) continue;
-    const Nanoseconds time = dues_[index] + horizon_;
-    port_.put({index, channel.motion->next()->direction, time, channel.state.still});
-    if (horizon_ != 0) sent(channel, time);
+    StepPort::Step step{index, channel.motion->next()->direction, channel.at, channel.state.still};
+    if (horizon_ == 0) {
+      port_.put(step);
+    } else {
+      putAhead(channel, step);
+    }
   }
   // Reading the switches took time, and a stop may have come meanwhile: it takes the steps back.
   if (emergencyStopped()) stopAll(now);
@@ -455,6 +480,9 @@ void PulseEngine::played(std::size_t index, int direction, MotorSet still, Nanos
     // The write itself has taken time.
     if (motion.mayBeLate()) slide(motion.excess(time - state_.slipped));
     motion.advance();
+  } else {
+    channel.state.still |= still;
+    channel.is_fast = channel.motion->isFastAt(time - channel.state.rose);
   }
   ++state_.pulses;
   state_.worst_lateness = std::max(state_.worst_lateness, channel.late);
@@ -464,15 +492,55 @@ void PulseEngine::played(std::size_t index, int direction, MotorSet still, Nanos
   if (horizon_ != 0) closed(channel, 1);
 }
 
-// The timeline goes on from here, whenever the port plays it.
-void PulseEngine::sent(Channel& channel, Nanoseconds time) {
-  if (channel.motion->nextIsFast()) channel.fast_until = time;
+// Puts all that is due: no channel is further ahead than another one when the timeline slides,
+// which moves only what hasn't been put.
+void PulseEngine::fillPort(Nanoseconds now) {
+  bool fills = true;
+  while (fills && dues_.earliest() <= now) {
+    const std::uint64_t before = puts_;
+    putSteps(now);
+    scheduleChanged();
+    fills = puts_ != before;
+  }
+}
+
+// The timeline continues from here, whenever the port plays the step.
+void PulseEngine::putAhead(Channel& channel, StepPort::Step& step) {
+  for (const Channel* axis : channel.kin->axes) {
+    if (!axis->motion->follows()) continue;
+    const int direction = axis->motion->directionAt(channel.motion->next()->time_ns);
+    if (direction > 0) step.forward |= StepPort::laneBit(axis->index);
+    if (direction < 0) step.backward |= StepPort::laneBit(axis->index);
+  }
+  port_.put(step);
+  ++channel.put;
+  ++puts_;
   ++channel.kin->open;
   channel.motion->advance();
   changed(channel);
 }
 
+// The timeline is ahead of what is played.
+void PulseEngine::tellFollowed(Nanoseconds now) {
+  for (std::size_t i = 0; i < axes_; ++i) {
+    Channel& axis = *channels_[i];
+    if (axis.tellAt() == kNever || axis.tellAt() + state_.slipped > now) continue;
+    axis.tell(now - state_.slipped);
+    axis.publish();
+  }
+}
+
+Nanoseconds PulseEngine::tellDue() const {
+  Nanoseconds due = kNever;
+  for (std::size_t i = 0; i < axes_; ++i) {
+    const Nanoseconds at = channels_[i]->tellAt();
+    if (at != kNever) due = std::min(due, at + state_.slipped);
+  }
+  return due;
+}
+
 void PulseEngine::closed(Channel& channel, std::size_t steps) {
+  channel.over += steps;
   channel.kin->open -= steps;
   if (channel.kin->open == 0 && channel.kin->drains) concludeEnd(*channel.kin);
 }
@@ -481,14 +549,16 @@ void PulseEngine::ready(std::size_t channel) { changed(*channels_[channel]); }
 
 void PulseEngine::givenBack(std::size_t channel, std::size_t steps) {
   changed(*channels_[channel]);
+  channels_[channel]->kin->unmade = true;
   closed(*channels_[channel], steps);
 }
 
-void PulseEngine::stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
-                          MotorSet still) {
-  channels_[channel]->state.still |= still;
-  if (reason == EndReason::kChipFault) channels_[channel]->guard.noteFault(0);
-  object(*channels_[channel], {reason, failure}, clock_.now());
+void PulseEngine::stopped(std::size_t channel, const StepPort::Stop& stop) {
+  Channel& stepped = *channels_[channel];
+  stepped.state.still |= stop.still;
+  Channel& axis = *stepped.kin->axisOf(*channels_[stop.lane]);
+  if (stop.reason == EndReason::kChipFault) axis.guard.noteFault(stop.motor);
+  object(axis, {stop.reason, stop.failure}, clock_.now());
 }
 
 void PulseEngine::failed(std::size_t channel, const LineFailure& failure, Nanoseconds now) {
@@ -511,7 +581,7 @@ void PulseEngine::finish(Channel& channel, Nanoseconds now) {
   if (endOf(channel) > now) return;
   if (channel.motion->hasSuccessor()) {
     channel.motion->takeOver();
-    channel.adopted();
+    channel.adopted(horizon_ == 0);
     return channel.publish();
   }
   if (!channel.motion->settles()) return end(channel, EndReason::kDone, now);
@@ -553,8 +623,9 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
   Kin& kin = *channel.kin;
   if (kin.ends) return;
   kin.ends = true;
-  const bool abrupt = isFast(channel, now);
+  const bool abrupt = horizon_ == 0 && channel.motion->isFast(now - state_.slipped);
   kin.drains = kin.open != 0;
+  for (const Channel* one : kin.all) kin.unmade = kin.unmade || one->motion->next().has_value();
   for (Channel* axis : kin.axes) {
     const bool moved = axis->motion->follows();
     if (!moved && axis != &channel) {
@@ -563,6 +634,7 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
     }
     endOne(*axis, axis == &channel || isOfAllAxes(reason) ? reason : EndReason::kCompanion, abrupt,
            now);
+    axis->ended_early = moved;
     if (!moved || axis->group == 0) continue;
     for (const auto& other : channels_) {
       if (other->motion->follows() && other->group == axis->group && other->kin != &kin) {
@@ -578,21 +650,22 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
   news_ = true;
 }
 
-bool PulseEngine::isFast(const Channel& channel, Nanoseconds now) const {
-  if (channel.motion->isFast(now - state_.slipped)) return true;
-  const auto& all = channel.kin->all;
-  return std::any_of(all.begin(), all.end(),
-                     [now](const Channel* one) { return now <= one->fast_until; });
-}
-
-// Every step that was handed over has been played or given back: the motors stand at their counts.
+// Every step that was handed over has been played or given back: the motors stand at their counts,
+// and the last steps that were played tell whether they have stopped from a high speed.
 void PulseEngine::concludeEnd(Kin& kin) {
   kin.drains = false;
+  bool abrupt = false;
   for (Channel* channel : kin.all) {
     channel->motion->rescale(channel->state.count);
-    channel->fast_until = -1;
+    abrupt = abrupt || (kin.unmade && channel->is_fast);
+    channel->is_fast = false;
   }
-  for (Channel* axis : kin.axes) axis->motion->halt();
+  kin.unmade = false;
+  for (Channel* axis : kin.axes) {
+    axis->state.end_abrupt = axis->state.end_abrupt || (abrupt && axis->ended_early);
+    axis->ended_early = false;
+    axis->motion->halt();
+  }
   kin.halted();
   for (Channel* channel : kin.all) {
     channel->state.rests_at = channel->motion->restsAt();
@@ -637,8 +710,9 @@ inline void PulseEngine::slideFor(const Channel& channel, Nanoseconds earliest) 
 inline void PulseEngine::scheduleStep(Channel& channel) {
   Nanoseconds earliest = std::max(channel.state.ready, channel.lane.takes);
   if (channel.lane.stepped) earliest = std::max(earliest, closestStep(channel));
-  const Nanoseconds time = std::max(channel.motion->next()->time_ns + state_.slipped, earliest);
-  dues_.set(channel.index, time - horizon_);
+  channel.at = std::max(channel.motion->next()->time_ns + state_.slipped, earliest);
+  // A chip that wakes has no fault output yet.
+  dues_.set(channel.index, std::max(channel.at - horizon_, channel.state.ready));
   slideFor(channel, earliest);
 }
 
@@ -650,7 +724,7 @@ void PulseEngine::schedule(Channel& channel) {
       dues_.set(channel.index, kNever);
       return;
     }
-    channel.adopted();
+    channel.adopted(horizon_ == 0);
     channel.publish();
   }
   const auto& next = motion.next();
@@ -661,6 +735,7 @@ void PulseEngine::schedule(Channel& channel) {
     if (next && !motion.isReplaced()) slideFor(channel, closestStep(channel));
   } else if (!next) {
     aim(channel, 0);
+    if (horizon_ != 0 && motion.follows()) channel.noteLastSteps();
     dues_.set(channel.index, motion.follows() ? endOf(channel) : kNever);
   } else if (channel.lane.accepts(next->direction)) {
     aim(channel, 0);
@@ -673,8 +748,11 @@ void PulseEngine::schedule(Channel& channel) {
 
 Nanoseconds PulseEngine::endOf(const Channel& channel) const {
   const auto end = channel.motion->endsAt();
+  if (!end) return kNever;
+  // The steps of a successor are put ahead of time.
+  if (channel.motion->hasSuccessor()) return *end + state_.slipped - horizon_;
   // The last pulses must be over, also those of shared motors.
-  if (!end || (!channel.motion->hasSuccessor() && channel.kin->isBusy())) return kNever;
+  if (horizon_ == 0 ? channel.kin->isBusy() : !channel.isPlayed()) return kNever;
   return std::max(*end + state_.slipped, channel.guard.lookAt());
 }
 

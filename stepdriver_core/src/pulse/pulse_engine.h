@@ -117,7 +117,10 @@ class PulseEngine : private StepPort::Listener {
   /// order that: a channel that has no order for it (Follow::slows) by EmergencyStops::kRampBegins
   /// is stopped at once, like each channel after this time or at another call of emergencyStop().
   /// The input ends no ramp, because its contacts bounce. Set before the first serve().
-  void rampStops(Nanoseconds longest) { stops_.rampStops(longest); }
+  void rampStops(Nanoseconds longest) {
+    // An order to decelerate can't begin before the port's horizon.
+    stops_.rampStops(longest > 0 ? longest + horizon_ : 0);
+  }
   /// The count of requested stops when the last ramp began.
   std::uint64_t stopsRamping() const { return stops_.ramping(); }
   std::uint64_t stopsAsked() const { return stops_.asked(); }
@@ -154,6 +157,8 @@ class PulseEngine : private StepPort::Listener {
   LatenessFigures latenessLastSecond() const { return lateness_.lastSecond(clock_.now()); }
 
   std::size_t channels() const;
+  /// Of the port: a profile is refused if it begins sooner than this from now.
+  Nanoseconds horizon() const { return horizon_; }
 
  private:
   using Channel = EngineChannel;
@@ -190,8 +195,11 @@ class PulseEngine : private StepPort::Listener {
   bool meetLateness(Nanoseconds now);
   void putSteps(Nanoseconds now);
   void servePort(Nanoseconds now);
-  void sent(Channel& channel, Nanoseconds time);
+  void fillPort(Nanoseconds now);
+  void putAhead(Channel& channel, StepPort::Step& step);
   void closed(Channel& channel, std::size_t steps);
+  void tellFollowed(Nanoseconds now);
+  Nanoseconds tellDue() const;
   void finishDue(Nanoseconds now);
   void writeHeartbeat(Nanoseconds now);
   void finish(Channel& channel, Nanoseconds now);
@@ -200,8 +208,7 @@ class PulseEngine : private StepPort::Listener {
   void played(std::size_t channel, int direction, MotorSet still, Nanoseconds time) override;
   void ready(std::size_t channel) override;
   void givenBack(std::size_t channel, std::size_t steps) override;
-  void stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
-               MotorSet still) override;
+  void stopped(std::size_t channel, const StepPort::Stop& stop) override;
   void failed(std::size_t channel, const LineFailure& failure, Nanoseconds now) override;
 
   // Ends.
@@ -210,7 +217,6 @@ class PulseEngine : private StepPort::Listener {
   void end(Channel& channel, EndReason reason, Nanoseconds now);
   void endEarly(Channel& channel, EndReason reason, Nanoseconds now);
   void concludeEnd(Kin& kin);
-  bool isFast(const Channel& channel, Nanoseconds now) const;
   void endOne(Channel& channel, EndReason reason, bool abrupt, Nanoseconds now);
 
   // Times.
@@ -243,6 +249,7 @@ class PulseEngine : private StepPort::Listener {
   // Of one pass: the due channels, and those to schedule.
   std::vector<std::size_t> due_;
   std::vector<Channel*> changed_;
+  std::uint64_t puts_ = 0;  // steps that were put ahead of time
   bool slid_ = false;
   bool outdated_ = false;  // the timeline has slid since all channels were scheduled
   Mailbox<Command, 64> mail_;

@@ -100,7 +100,9 @@ class Follower {
   /// It moves at a speed at which a motor can't start or stop at once.
   virtual bool isFast(Nanoseconds motion_now) const;
   /// The same of its next step, by its interval.
-  bool nextIsFast() const { return running_ && next_ && interval() < pace_.restart_interval; }
+  bool nextIsFast() const { return running_ && next_ && isFastAt(interval()); }
+  /// The same of steps at this interval.
+  bool isFastAt(Nanoseconds interval) const { return interval < pace_.restart_interval; }
   /// The direction of the axis at a step of the channel with its switches, whichever way the motor
   /// turns: +1, -1, or 0 if it doesn't move. @param step time of it
   virtual int directionAt(Nanoseconds step) const;

@@ -34,6 +34,8 @@ class Ear : public StepPort::Listener {
     std::vector<Nanoseconds> times;
     std::vector<MotorSet> still;
     std::optional<EndReason> stopped;
+    std::size_t lane = 0;   // whose input stopped it
+    std::size_t motor = 0;  // of that lane
     LineFailure failure;
   };
 
@@ -50,10 +52,11 @@ class Ear : public StepPort::Listener {
   void givenBack(std::size_t channel, std::size_t steps) override {
     heard.at(channel).given_back += steps;
   }
-  void stopped(std::size_t channel, EndReason reason, const LineFailure& failure,
-               MotorSet /*still*/) override {
-    heard.at(channel).stopped = reason;
-    heard.at(channel).failure = failure;
+  void stopped(std::size_t channel, const StepPort::Stop& stop) override {
+    heard.at(channel).stopped = stop.reason;
+    heard.at(channel).failure = stop.failure;
+    heard.at(channel).lane = stop.lane;
+    heard.at(channel).motor = stop.motor;
   }
   void failed(std::size_t channel, const LineFailure& failure, Nanoseconds /*now*/) override {
     heard.at(channel).failure = failure;
@@ -78,9 +81,11 @@ struct Gpio {
 template <Nanoseconds kLate>
 struct Ahead {
   static constexpr Nanoseconds kEarly = std::max<Nanoseconds>(0, -kLate);
-  Ahead(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels)
+  Ahead(gpio::Lines& lines, Clock& clock, const std::vector<ChannelConfig>& channels,
+        Nanoseconds take_back = 0)
       : port(lines, clock, channels,
-             {50 * kMillisecond, [](const StepPort::Step& /*step*/) { return kLate; }}) {}
+             {50 * kMillisecond, [](const StepPort::Step& /*step*/) { return kLate; }, take_back}) {
+  }
   static std::string name() {
     if (kLate == 0) return "Ahead";
     return kLate > 0 ? "AheadAndLate" : "AheadAndEarly";
@@ -134,6 +139,9 @@ class StepPortConformance : public testing::Test {
       while (!lane.accepts(step.direction)) runUntil(std::max(port().due(), clock.now()));
     }
     step.time = std::max(step.time, lane.takes);
+    if ((step.forward | step.backward) == 0) {
+      (step.direction > 0 ? step.forward : step.backward) = StepPort::laneBit(step.channel);
+    }
     runUntil(step.time - port().horizon());
     port().put(step);
     port().serve(clock.now());
@@ -233,7 +241,7 @@ TYPED_TEST(StepPortConformance, TellsOfEachStepWhetherItWasPlayedOrGivenBack) {
     this->put({1, -1, time});
     ++put;
   }
-  const std::size_t played = this->heard(0).played;
+  const auto played = static_cast<std::size_t>(this->risesOf(this->configs[0]));
   this->port().takeBack(0);
   this->runUntil(this->clock.now() + 200 * kMillisecond);
 
@@ -361,6 +369,81 @@ TEST_F(PortWithAHorizon, StopsAtAFaultOfTheChip) {
   EXPECT_EQ(heard().stopped, EndReason::kChipFault);
   EXPECT_EQ(heard().played, 1u);
   EXPECT_EQ(heard().given_back, 3u);
+}
+
+TEST_F(PortWithAHorizon, StopsAtASwitchOfAnAxisThatSharesTheMotor) {
+  ChannelConfig axis = config(1);
+  axis.endstop_min = Signal{7, true};
+  make({config(0), axis});
+  const StepPort::LaneSet other = StepPort::laneBit(1);
+  for (int i = 0; i < 20; ++i) put({0, 1, kStart + i * kMillisecond, 0, 0, other});
+  runUntil(kStart + kMillisecond / 2);
+  lines.inputs[7] = 1;
+  runUntil(kStart + 200 * kMillisecond);
+  EXPECT_EQ(heard().stopped, EndReason::kEndstopMin);
+  EXPECT_EQ(heard().lane, 1u);
+  EXPECT_EQ(heard().played, 1u);
+  // Away from it.
+  for (int i = 0; i < 3; ++i) put({0, 1, clock.now() + kMillisecond, 0, other, 0});
+  runUntil(clock.now() + 200 * kMillisecond);
+  EXPECT_EQ(heard().played, 4u);
+}
+
+TEST_F(PortWithAHorizon, NamesTheMotorWhoseChipHasAFault) {
+  ChannelConfig gantry = config(0);
+  MotorSignals& twin = gantry.twins.emplace_back();
+  twin.step.line = 2;
+  twin.dir.line = 3;
+  twin.fault = Signal{7, true};
+  make({gantry});
+  for (int i = 0; i < 4; ++i) put({0, 1, kStart + i * kMillisecond});
+  runUntil(kStart + kMillisecond / 2);
+  lines.inputs[7] = 1;
+  runUntil(kStart + 200 * kMillisecond);
+  EXPECT_EQ(heard().stopped, EndReason::kChipFault);
+  EXPECT_EQ(heard().motor, 1u);
+}
+
+TEST_F(PortWithAHorizon, LeavesOutAMotorThatHasReachedItsSwitchUntilTheNextMotion) {
+  ChannelConfig gantry = config(0);
+  gantry.endstop_max = Signal{7, true};
+  gantry.max_skew = 100;
+  MotorSignals& twin = gantry.twins.emplace_back();
+  twin.step.line = 2;
+  twin.dir.line = 3;
+  twin.endstop_max = Signal{8, true};
+  make({gantry});
+  port().begin(0, {0, true, true});
+  for (int i = 0; i < 10; ++i) put({0, 1, kStart + i * kMillisecond});
+  runUntil(kStart + 2 * kMillisecond + kMillisecond / 2);
+  lines.inputs[7] = 1;
+  runUntil(kStart + 5 * kMillisecond + kMillisecond / 2);
+  lines.inputs[8] = 1;
+  runUntil(kStart + 200 * kMillisecond);
+  EXPECT_EQ(risesOf(gantry), 3);
+  EXPECT_EQ(risesOf(twin), 6);
+  EXPECT_EQ(heard().stopped, EndReason::kEndstopMax);
+  EXPECT_EQ(heard().still, (std::vector<MotorSet>{0, 0, 0, motorBit(0), motorBit(0), motorBit(0)}));
+  lines.inputs[7] = lines.inputs[8] = 0;
+  port().begin(0, {});
+  put({0, 1, clock.now() + kMillisecond});
+  runUntil(clock.now() + 200 * kMillisecond);
+  EXPECT_EQ(risesOf(gantry), 4);
+  EXPECT_EQ(risesOf(twin), 7);
+}
+
+TEST_F(PortWithAHorizon, AccountsForStepsThatGoOutWhileTheyAreTakenBack) {
+  make({config(0)});
+  board = std::make_unique<Punctual>(lines, clock, configs, 5 * kMillisecond);
+  port().listen(*ear);
+  for (int i = 0; i < 20; ++i) put({0, 1, kStart + i * kMillisecond});
+  runUntil(kStart + 3 * kMillisecond + kMillisecond / 2);
+  EXPECT_EQ(heard().played, 4u);
+  port().takeBack(0);
+  runUntil(kStart + 200 * kMillisecond);
+  EXPECT_EQ(heard().played, 9u);
+  EXPECT_EQ(heard().given_back, 11u);
+  EXPECT_EQ(risesOf(configs[0]), 9);
 }
 
 // The board plays in a thread of its own against a real clock; what it plays, the engine's thread

@@ -21,10 +21,11 @@ constexpr Nanoseconds kStart = 100 * kMillisecond;
 class EngineWithHorizon : public PulseEngineTest {
  protected:
   void makeAhead(const std::vector<ChannelConfig>& channels, Nanoseconds late = 0,
-                 const std::vector<SharedAxes>& shared = {}) {
+                 const std::vector<SharedAxes>& shared = {}, Nanoseconds take_back = 0) {
     port = std::make_unique<test::AheadPort>(
         lines, clock, PulseEngine::lanesOf(channels, shared),
-        test::AheadPort::Habits{kHorizon, [late](const StepPort::Step&) { return late; }});
+        test::AheadPort::Habits{kHorizon, [late](const StepPort::Step&) { return late; },
+                                take_back});
     engine = std::make_unique<PulseEngine>(*port, lines, clock, channels, 5 * kMillisecond,
                                            std::nullopt, shared);
   }
@@ -41,6 +42,14 @@ class EngineWithHorizon : public PulseEngineTest {
       while (clock.now() < due) clock.waitUntil(due);
     }
     while (clock.now() < until) clock.waitUntil(until);
+  }
+
+  static SharedAxes corexy() {
+    SharedAxes shared;
+    shared.channels = {0, 1};
+    shared.matrix = {{1.0, 1.0}, {1.0, -1.0}};
+    shared.inverse = {{0.5, 0.5}, {0.5, -0.5}};
+    return shared;
   }
 
   std::int64_t rises(int line) { return static_cast<std::int64_t>(lines.rises(line).size()); }
@@ -171,11 +180,7 @@ TEST_F(EngineWithHorizon, SlidesTheTimelineOnlyIfItIsLaterThanItsHorizon) {
 }
 
 TEST_F(EngineWithHorizon, TellsThePlacesOfAxesThatShareMotorsByWhatWasPlayed) {
-  SharedAxes shared;
-  shared.channels = {0, 1};
-  shared.matrix = {{1.0, 1.0}, {1.0, -1.0}};
-  shared.inverse = {{0.5, 0.5}, {0.5, -0.5}};
-  makeAhead({config(0), config(1)}, 0, {shared});
+  makeAhead({config(0), config(1)}, 0, {corexy()});
   follow(cruise(kStart, 0, 1'000, 10'000.0), 0);
   run(kStart + 10 * kMillisecond);
   EXPECT_NEAR(static_cast<double>(engine->channel(0).count), 100.0, 2.0);
@@ -183,6 +188,155 @@ TEST_F(EngineWithHorizon, TellsThePlacesOfAxesThatShareMotorsByWhatWasPlayed) {
   run(kStart + 300 * kMillisecond);
   EXPECT_EQ(2 * engine->channel(0).count, rises(0) + rises(kLinesPerChannel));
   EXPECT_NEAR(engine->channel(0).rests_at, static_cast<double>(rises(0)), 1.0);
+}
+
+// The other one's steps are always open.
+TEST_F(EngineWithHorizon, EndsAnAxisWhileOneThatSharesItsMotorsContinues) {
+  makeAhead({config(0), config(1)}, 0, {corexy()});
+  follow(cruise(kStart, 0, 100, 10'000.0), 0);
+  follow(cruise(kStart, 0, 10'000, 10'000.0), 1);
+  run(kStart + 12 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).following, 0u);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_NEAR(static_cast<double>(engine->channel(0).count), 100.0, 1.0);
+  EXPECT_GT(engine->channel(1).following, 0u);
+}
+
+TEST_F(EngineWithHorizon, SaysThatItFollowsAProfileWhenThatIsPlayedAndNotWhenItIsPut) {
+  makeAhead({config(0)});
+  const std::uint64_t first = follow(cruise(kStart, 0, 1'000, 10'000.0));
+  run(kStart + 20 * kMillisecond);
+  const std::uint64_t second =
+      follow(cruise(kStart + 80 * kMillisecond, 800, 500, 10'000.0), 0, first);
+  run(kStart + 79 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).accepted, second);
+  EXPECT_EQ(engine->channel(0).following, first);
+  run(kStart + 81 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).following, second);
+}
+
+TEST_F(EngineWithHorizon, EndsTheAxisWhoseSwitchStopsASharedMotor) {
+  ChannelConfig x = config(0);
+  x.endstop_max = Signal{7, true};
+  ChannelConfig y = config(1);
+  y.endstop_max = Signal{8, true};
+  for (const int line : {7, 8}) {
+    makeAhead({x, y}, 0, {corexy()});
+    const Nanoseconds start = clock.now() + kStart;
+    plan(cruise(start, 0, 1'000, 10'000.0), 0);
+    plan(cruise(start, 0, 1'000, 5'000.0), 1);
+    postFollows(2);
+    run(start + 10 * kMillisecond);
+    lines.inputs[line] = 1;
+    const std::int64_t count = engine->channel(line - 7).count;
+    run(start + 300 * kMillisecond);
+    EXPECT_EQ(engine->channel(line - 7).end, EndReason::kEndstopMax) << line;
+    EXPECT_EQ(engine->channel(8 - line).end, EndReason::kCompanion) << line;
+    EXPECT_NEAR(static_cast<double>(engine->channel(line - 7).count), static_cast<double>(count),
+                1.0);
+    lines.inputs[line] = 0;
+  }
+}
+
+TEST_F(EngineWithHorizon, PassesASwitchBehindAnAxisThatSharesItsMotors) {
+  ChannelConfig x = config(0);
+  x.endstop_min = Signal{7, true};
+  lines.inputs[7] = 1;
+  makeAhead({x, config(1)}, 0, {corexy()});
+  // Motor b turns backward, as y moves faster than x.
+  plan(cruise(kStart, 0, 100, 5'000.0), 0);
+  plan(cruise(kStart, 0, 300, 10'000.0), 1);
+  postFollows(2);
+  run(kStart + 300 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kDone);
+  EXPECT_EQ(engine->channel(0).count, 100);
+  EXPECT_EQ(engine->channel(1).count, 300);
+}
+
+TEST_F(EngineWithHorizon, SquaresTheMotorsOfAGantryAtTheirOwnSwitches) {
+  ChannelConfig gantry = config(0);
+  gantry.endstop_max = Signal{7, true};
+  gantry.max_skew = 500;
+  MotorSignals& twin = gantry.twins.emplace_back();
+  twin.step.line = 2;
+  twin.dir.line = 3;
+  twin.endstop_max = Signal{8, true};
+  makeAhead({gantry});
+  Follow& order = plan(cruise(kStart, 0, 1'000, 10'000.0));
+  order.squares = order.is_square = true;
+  postFollows(1);
+  run(kStart + 10 * kMillisecond);
+  lines.inputs[7] = 1;
+  const std::int64_t first = rises(0);
+  run(kStart + 20 * kMillisecond);
+  lines.inputs[8] = 1;
+  const std::int64_t second = rises(2);
+  run(kStart + 300 * kMillisecond);
+  const ChannelState state = engine->channel(0);
+  EXPECT_EQ(rises(0), first);
+  EXPECT_EQ(rises(2), second);
+  EXPECT_EQ(second - first, 100);
+  EXPECT_EQ(state.end, EndReason::kEndstopMax);
+  EXPECT_EQ(state.still, motorBit(0) | motorBit(1));
+  EXPECT_EQ(state.count + state.lags[0], first);
+  EXPECT_EQ(state.count + state.lags[1], second);
+}
+
+TEST_F(EngineWithHorizon, EndsASquaringBeforeItsMotorsAreFurtherApartThanAllowed) {
+  ChannelConfig gantry = config(0);
+  gantry.endstop_max = Signal{7, true};
+  gantry.max_skew = 30;
+  MotorSignals& twin = gantry.twins.emplace_back();
+  twin.step.line = 2;
+  twin.dir.line = 3;
+  twin.endstop_max = Signal{8, true};
+  makeAhead({gantry});
+  Follow& order = plan(cruise(kStart, 0, 1'000, 10'000.0));
+  order.squares = order.is_square = true;
+  postFollows(1);
+  run(kStart + 10 * kMillisecond);
+  lines.inputs[7] = 1;
+  run(kStart + 300 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).end, EndReason::kSkewed);
+  EXPECT_EQ(rises(2) - rises(0), 30);
+}
+
+// When the stop comes, the motor is still slow; when it reaches the board, it isn't.
+TEST_F(EngineWithHorizon, KnowsThatAStopWasAbruptBecauseTheMotorSpedUpUntilItArrived) {
+  restart_interval = 500'000;
+  for (const Nanoseconds take_back : {Nanoseconds{0}, 30 * kMillisecond}) {
+    makeAhead({config(0)}, 0, {}, take_back);
+    const Nanoseconds start = clock.now() + kStart;
+    follow(motion::planFromRest(start, 0, 3'000, {100.0, 20'000.0, 1e5, 1e5}));
+    run(start + 5 * kMillisecond);
+    engine->emergencyStop();
+    run(clock.now() + 200 * kMillisecond);
+    EXPECT_EQ(engine->channel(0).end, EndReason::kEmergencyStop);
+    EXPECT_EQ(engine->channel(0).end_abrupt, take_back != 0) << "taken back in " << take_back;
+  }
+}
+
+// What has been put can't slide with the timeline.
+TEST_F(EngineWithHorizon, KeepsChannelsTogetherWhenTheTimelineSlides) {
+  full_step = 16;
+  makeAhead({config(0), config(1)});
+  plan(cruise(kStart, 0, 400, 2'000.0), 0);
+  plan(cruise(kStart, 0, 4'000, 20'000.0), 1);
+  postFollows(2);
+  // Each pass is late, at first by less than the horizon.
+  std::int64_t apart = 0;
+  while (clock.now() < kStart + 3'000 * kMillisecond) {
+    engine->serve();
+    const Nanoseconds next = clock.now() + 53 * kMillisecond;
+    while (clock.now() < next) {
+      clock.waitUntil(std::min(port->playDue(), next));
+      port->play(clock.now());
+      apart = std::max(apart, std::abs(10 * rises(0) - rises(kLinesPerChannel)));
+    }
+  }
+  EXPECT_GT(engine->state().slips, 0u);
+  EXPECT_EQ(rises(0), 400);
+  EXPECT_LE(apart, 10 + 2);
 }
 
 }  // namespace

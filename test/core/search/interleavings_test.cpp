@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,6 +27,10 @@ constexpr std::size_t kShards = 16;
 std::string textOf(const Schedule& schedule) {
   std::string text = "variant " + std::to_string(schedule.variant) + "\n";
   for (const config::AxisConfig& axis : schedule.machine) text += "  " + describe(axis) + "\n";
+  if (const auto& ahead = schedule.ahead) {
+    text += fmt::format("  a port with a horizon of {} ns, late by {} ns, takes back in {} ns\n",
+                        ahead->horizon, ahead->late, ahead->take_back);
+  }
   for (const Item& item : schedule.items) {
     text += "  client " + std::string(item.client == 0 ? "A" : "B") + ", after " +
             std::to_string(item.after) + " steps: " + actOf(item).name + "\n";
@@ -77,11 +82,13 @@ std::size_t any(std::mt19937_64& random, std::size_t count) {
 
 void deviate(Schedule& schedule, std::mt19937_64& random) {
   const std::size_t count = 1 + any(random, 3);
+  // Only a port with a horizon has a board.
+  const std::size_t participants = kParticipants - (schedule.ahead ? 0 : 1);
   for (std::size_t i = 0; i < count; ++i) {
     static constexpr std::array<std::size_t, 6> steps = {1, 2, 4, 10, 40, 200};
     static constexpr std::array<std::size_t, 4> reach = {10, 30, 120, 600};
     schedule.deviations.push_back({any(random, reach[any(random, reach.size())]),
-                                   static_cast<Who>(any(random, kParticipants)),
+                                   static_cast<Who>(any(random, participants)),
                                    steps[any(random, steps.size())]});
   }
 }
@@ -158,6 +165,21 @@ Schedule crowdOf(std::mt19937_64& random) {
   return schedule;
 }
 
+Ahead drawAhead(std::mt19937_64& random) {
+  constexpr pulse::Nanoseconds kMicrosecond = 1'000;
+  static constexpr std::array<pulse::Nanoseconds, 4> horizons = {
+      50 * kMicrosecond, 1'000 * kMicrosecond, 10'000 * kMicrosecond, 50'000 * kMicrosecond};
+  static constexpr std::array<pulse::Nanoseconds, 4> late = {0, 0, -30 * kMicrosecond,
+                                                             300 * kMicrosecond};
+  static constexpr std::array<pulse::Nanoseconds, 4> take_back = {0, 0, 200 * kMicrosecond,
+                                                                  5'000 * kMicrosecond};
+  Ahead ahead;
+  ahead.horizon = horizons.at(any(random, horizons.size()));
+  ahead.late = late.at(any(random, late.size()));
+  ahead.take_back = take_back.at(any(random, take_back.size()));
+  return ahead;
+}
+
 /// About 340,000 schedules altogether. For long runs by hand: STEPDRIVER_SCHEDULES is the number of
 /// schedules of each sampled kind, STEPDRIVER_FIRST_SEED the first seed, and STEPDRIVER_FAILURES
 /// the number of failures after which a test ends. A seed means the same schedule, whatever these
@@ -232,6 +254,35 @@ TEST_P(Interleavings, KeepThePromisesForManyRequests) {
     Schedule schedule = crowdOf(random);
     if (any(random, 4) != 0) deviate(schedule, random);
     return expectGood(schedule, "many, seed " + std::to_string(seed));
+  });
+}
+
+/// The same kinds on a port that takes steps ahead of time.
+TEST_P(Interleavings, KeepThePromisesWithAHorizon) {
+  forEachSeed([this](std::uint64_t seed) {
+    std::mt19937_64 random(seed);
+    Ahead ahead = drawAhead(random);
+    Schedule schedule;
+    switch (any(random, 5)) {
+      case 0:
+        schedule = pairOf(any(random, pairs()));
+        break;
+      case 1:
+        schedule = crowdOf(random);
+        break;
+      case 2:
+        schedule = tripleOf(random);
+        schedule.may_last = true;
+        schedule.machine = drawMachine(schedule.variant, [&] { return anyPart(random); });
+        // An early step after one that the engine has put late would be closer than it may be.
+        ahead.late = std::max<pulse::Nanoseconds>(ahead.late, 0);
+        break;
+      default:
+        schedule = tripleOf(random);
+    }
+    schedule.ahead = ahead;
+    if (any(random, 2) == 0) deviate(schedule, random);
+    return expectGood(schedule, "ahead, seed " + std::to_string(seed));
   });
 }
 

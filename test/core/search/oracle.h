@@ -59,6 +59,9 @@ class Oracle {
   /// These axes share motors: a pulse is allowed if the motion of any of them allows it.
   void share(std::vector<std::size_t> axes) { sharing_ = std::move(axes); }
 
+  /// How long steps may still go out when an emergency stop takes them back, until its answer.
+  void takesBack(pulse::Nanoseconds longest) { takes_back_ = longest; }
+
   /// A call was handed to the controller.
   void served(std::uint64_t call, const std::string& name, const Meaning& meaning) {
     calls_[call] = {meaning.as_of != 0 ? meaning.as_of : moment(), name, meaning};
@@ -135,7 +138,7 @@ class Oracle {
     const bool ramps = ramp_begins.has_value();
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       const pulse::Nanoseconds since =
-          ramps ? now + *ramp_begins + slowingOf(axis) - slipped_() : now;
+          ramps ? now + *ramp_begins + slowingOf(axis) - slipped_() : now + takes_back_;
       quiets_[axis].push_back(
           {moment(), Meaning::Quiet::kEmergency, "emergency stop", since, ramps});
     }
@@ -145,8 +148,8 @@ class Oracle {
   void emergencyStopAnswered(pulse::Nanoseconds now) {
     for (auto& quiets : quiets_) {
       for (Quiet& quiet : quiets) {
-        if (quiet.kind != Meaning::Quiet::kEmergency || !quiet.slows) continue;
-        quiet.since = std::min(quiet.since + slipped_(), now);
+        if (quiet.kind != Meaning::Quiet::kEmergency) continue;
+        quiet.since = std::min(quiet.since + (quiet.slows ? slipped_() : 0), now);
         quiet.slows = false;
       }
     }
@@ -288,6 +291,7 @@ class Oracle {
 
   std::array<Slowing, kAxes> slowing_;
   std::array<int, kAxes> longer_stops_{};
+  pulse::Nanoseconds takes_back_ = 0;
   std::vector<std::size_t> sharing_;
   const std::function<pulse::Nanoseconds()> slipped_;
   std::uint64_t order_ = 0;

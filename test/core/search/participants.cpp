@@ -24,6 +24,9 @@ constexpr pulse::Nanoseconds kInputPeriod = 100 * kMillisecond;
 constexpr pulse::Nanoseconds kMaxLateness = 5 * kMillisecond;
 /// The engine is at most this late; that is more than it can make up for.
 constexpr pulse::Nanoseconds kLatestPass = 8 * kMillisecond;
+/// A board that is late plays what is overdue as closely as the chips allow: its lateness is what a
+/// motor can follow, two steps at the top speed.
+constexpr pulse::Nanoseconds kLatestPlay = 500'000;
 /// From the answer of a stop to the beginning of the deceleration, without and with a late engine
 /// that refuses plans.
 constexpr pulse::Nanoseconds kLead = 2 * kMillisecond;
@@ -150,10 +153,31 @@ machine::MachineOptions optionsOf(int variant) {
   return options;
 }
 
-/// The schedule lets the engine be late.
-bool isEngineLate(const Schedule& schedule) {
+/// The schedule lets a participant be late.
+bool isLate(const Schedule& schedule, Who who) {
   return std::any_of(schedule.deviations.begin(), schedule.deviations.end(),
-                     [](const Deviation& deviation) { return deviation.who == Who::kEngine; });
+                     [who](const Deviation& deviation) { return deviation.who == who; });
+}
+
+bool isEngineLate(const Schedule& schedule) { return isLate(schedule, Who::kEngine); }
+
+/// Drawn machines may be fast.
+pulse::Nanoseconds latestPlayOf(const Schedule& schedule) {
+  return isLate(schedule, Who::kBoard) && schedule.machine.empty() ? kLatestPlay : 0;
+}
+
+/// From when steps are taken back until the last one that is played.
+pulse::Nanoseconds takingBack(const Schedule& schedule) {
+  if (!schedule.ahead) return 0;
+  return schedule.ahead->take_back + latestPlayOf(schedule) +
+         (isEngineLate(schedule) ? kLatestPass : 0);
+}
+
+/// By how much the last step of a motion is later than with a GpioPort.
+pulse::Nanoseconds aheadOf(const Schedule& schedule) {
+  if (!schedule.ahead) return 0;
+  return schedule.ahead->horizon + std::max<pulse::Nanoseconds>(schedule.ahead->late, 0) +
+         latestPlayOf(schedule);
 }
 
 std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& configs,
@@ -168,7 +192,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
       if (config.brake) spec.load_falls = kLoadFalls;
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
-      if (isEngineLate(schedule)) {
+      if (isEngineLate(schedule) || latestPlayOf(schedule) > 0) {
         spec.limits->late = machine::MachineOptions().late_steps * config.microsteps;
       }
       specs.push_back(spec);
@@ -206,7 +230,7 @@ std::array<Slowing, kAxes> slowingOf(const std::vector<config::AxisConfig>& conf
     if (config.jerk > 0.0) time += (deceleration + config.acceleration) / config.jerk;
     time *= 1.1;
     if (!schedule.machine.empty()) time += timeOfFullStep(config);
-    slowing[axis] = {std::llround(time * 1e9) + (late ? kLongestLead : kLead),
+    slowing[axis] = {std::llround(time * 1e9) + (late ? kLongestLead : kLead) + aheadOf(schedule),
                      std::llround(motor::shapingTimeOf(config) * 1e9)};
   }
   return slowing;
@@ -222,7 +246,7 @@ bool givesNoReason(const std::string& text) {
 const char* nameOf(Who who) {
   static const std::array<const char*, kParticipants> names = {
       "news",   "pin done", "input",    "request",  "timer", "engine",
-      "writer", "watcher",  "client A", "client B", "clock"};
+      "writer", "watcher",  "client A", "client B", "clock", "board"};
   return names.at(static_cast<std::size_t>(who));
 }
 
@@ -240,13 +264,24 @@ Participants::Participants(const Schedule& schedule)
   axis::LineNames names;
   for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
   for (const gpio::InputRequest& input : wiring_.inputs) names.inputs.push_back(input.line);
-  engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
-                                                 wiring_.emergency_stop, wiring_.shared);
+  if (const auto& ahead = schedule.ahead) {
+    const auto late = [by = ahead->late](const pulse::StepPort::Step&) { return by; };
+    port_ = std::make_unique<test::AheadPort>(
+        *lines_, clock_, pulse::PulseEngine::lanesOf(wiring_.channels, wiring_.shared),
+        test::AheadPort::Habits{ahead->horizon, late, ahead->take_back});
+    engine_ =
+        std::make_unique<pulse::PulseEngine>(*port_, *lines_, clock_, wiring_.channels,
+                                             kMaxLateness, wiring_.emergency_stop, wiring_.shared);
+    oracle_.takesBack(takingBack(schedule));
+  } else {
+    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
+                                                   wiring_.emergency_stop, wiring_.shared);
+  }
   if (schedule.variant == kSharing) oracle_.share({0, 1});
   controller_ = std::make_unique<machine::Controller>(
       configs_, wiring_.motor_lines, std::move(names), wiring_.emergency_stop,
       emergencyDisableOf(schedule.variant), wiring_.motorPower(optionsOf(schedule.variant)),
-      wiring_.namedLines(optionsOf(schedule.variant)));
+      wiring_.namedLines(optionsOf(schedule.variant)), engine_->horizon());
   if (ramps()) engine_->rampStops(machine::longestRamp(configs_));
   core_ = std::make_unique<machine::ShellCore>(*controller_, *engine_, clock_, lines_,
                                                wiring_.inputs.size(), static_cast<Host&>(*this),
@@ -387,7 +422,9 @@ bool Participants::canGo(Who who) {
     case Who::kTimer:
       return clock_.now() >= core_->due();
     case Who::kEngine:
-      return clock_.woken || clock_.now() >= engine_due_;
+      return engineIsDue();
+    case Who::kBoard:
+      return boardIsDue();
     case Who::kWriter:
       return !jobs_.empty() && (jobs_.front().returns <= clock_.now() ||
                                 std::any_of(jobs_.begin(), jobs_.end(), [this](const Job& job) {
@@ -418,9 +455,11 @@ bool Participants::isDelayed(Who who) const {
 }
 
 bool Participants::step() {
+  static constexpr std::array<Who, kParticipants> turns = {
+      Who::kNews,   Who::kPinDone, Who::kInput, Who::kRequest, Who::kTimer,   Who::kEngine,
+      Who::kWriter, Who::kWatcher, Who::kBoard, Who::kClientA, Who::kClientB, Who::kClock};
   std::optional<Who> late;
-  for (std::size_t i = 0; i < kParticipants; ++i) {
-    const Who who = static_cast<Who>(i);
+  for (const Who who : turns) {
     if (!canGo(who)) continue;
     if (isDelayed(who)) {
       if (!late) late = who;
@@ -470,7 +509,7 @@ void Participants::checkOutputs() {
 
 void Participants::act(Who who) {
   ++steps_;
-  if (log_ && who != Who::kEngine && who != Who::kClock) note(nameOf(who));
+  if (log_ && who != Who::kEngine && who != Who::kClock && who != Who::kBoard) note(nameOf(who));
   switch (who) {
     case Who::kNews:
       core_->takeNews();
@@ -511,6 +550,8 @@ void Participants::act(Who who) {
     }
     case Who::kClock:
       return advanceTo(nextDue());
+    case Who::kBoard:
+      return port_->play(clock_.now());
   }
 }
 
@@ -566,16 +607,28 @@ void Participants::watch() {
   core_->watchInputs(events.data(), count);
 }
 
+bool Participants::engineIsDue() { return clock_.woken || clock_.now() >= engine_due_; }
+
+bool Participants::boardIsDue() { return port_ && port_->playDue() <= clock_.now(); }
+
+// No time passes beyond it while the engine or the board are kept waiting.
+pulse::Nanoseconds Participants::latestTime() {
+  pulse::Nanoseconds latest = pulse::kNever;
+  if (engineIsDue()) latest = engine_waits_since_ + kLatestPass;
+  if (!boardIsDue()) return latest;
+  const pulse::Nanoseconds due = std::min(port_->playDue(), port_->oldestStep());
+  return std::min(latest, std::max(due + latestPlayOf(schedule_), clock_.now()));
+}
+
 pulse::Nanoseconds Participants::nextDue() {
   const pulse::Nanoseconds now = clock_.now();
-  const bool engine_waits = clock_.woken || engine_due_ <= now;
-  if (!engine_waits) engine_waits_since_ = pulse::kNever;
-  if (engine_waits) engine_waits_since_ = std::min(engine_waits_since_, now);
+  engine_waits_since_ = engineIsDue() ? std::min(engine_waits_since_, now) : pulse::kNever;
   pulse::Nanoseconds due = pulse::kNever;
   const auto look = [&](pulse::Nanoseconds time) {
     if (time > now) due = std::min(due, time);
   };
   look(engine_due_);
+  if (port_) look(port_->playDue());
   look(core_->due());
   look(watch_due_);
   for (const Client& client : clients_) {
@@ -585,8 +638,7 @@ pulse::Nanoseconds Participants::nextDue() {
   for (const Job& job : jobs_) {
     if (!job.told) look(job.deadline);
   }
-  if (!engine_waits) return due;
-  const pulse::Nanoseconds latest = engine_waits_since_ + kLatestPass;
+  const pulse::Nanoseconds latest = latestTime();
   return now < latest ? std::min(due, latest) : pulse::kNever;
 }
 
@@ -716,11 +768,14 @@ std::optional<double> Participants::relativeOrigin(std::size_t axis) {
     motor = count;
   };
   constexpr pulse::Nanoseconds kStep = 1'000'000;
-  const motion::ShapedProfile made = last.planned.made();
-  for (auto time = clock_.now() - engine_->state().slipped; time < made.endNs(); time += kStep) {
-    move_to(made.stateAt(time).position);
+  auto time = clock_.now() - engine_->state().slipped;
+  for (std::size_t i = 0; i < now.motions.size(); ++i) {
+    const motion::ShapedProfile made = now.motions[i].planned.made();
+    const bool is_last = i + 1 == now.motions.size();
+    const auto end = is_last ? made.endNs() : now.motions[i + 1].planned.made().startNs();
+    for (; time < end; time += kStep) move_to(made.stateAt(time).position);
+    if (is_last) move_to(made.endPosition());
   }
-  move_to(made.endPosition());
   return now.origin + static_cast<double>(motor - slack) / now.steps_per_unit;
 }
 
@@ -735,6 +790,22 @@ double Participants::placeOnRig(std::size_t axis) const {
              configs_[motor].steps_per_unit;
   }
   return place * configs_[axis].steps_per_unit;
+}
+
+// [configured microsteps] What the rig has seen and the engine hasn't heard of.
+double Participants::untoldOf(std::size_t axis) const {
+  if (!port_) return 0.0;
+  const auto& shared = configs_[axis].kinematics;
+  const auto scale = [this](std::size_t i) {
+    return configs_[i].steps_per_unit / controller_->snapshot()->axes.at(i).steps_per_unit;
+  };
+  if (shared == nullptr) return static_cast<double>(port_->untold(axis)) * scale(axis);
+  double untold = 0.0;
+  for (std::size_t motor = 0; motor < shared->axes.size(); ++motor) {
+    untold += shared->inverse[axis][motor] * scale(motor) *
+              static_cast<double>(port_->untold(kAxes + motor)) / configs_[motor].steps_per_unit;
+  }
+  return untold * configs_[axis].steps_per_unit;
 }
 
 // [microsteps] By how much a microstep of each motor moves it.
@@ -753,7 +824,8 @@ double Participants::onRig(std::size_t axis, double position) {
   const pulse::ChannelState live = engine_->channel(static_cast<int>(axis));
   const axis::AxisState now =
       machine::stateOf(snapshot->axes.at(axis), live, clock_.now(), clock_.now());
-  return placeOnRig(axis) + (position - now.position) * configs_[axis].steps_per_unit;
+  const double told = placeOnRig(axis) - untoldOf(axis);
+  return told + (position - now.position) * configs_[axis].steps_per_unit;
 }
 
 // Nothing that was asked before this call moves it any more, nor an axis that shares its motors:
@@ -786,7 +858,7 @@ double Participants::stoppingWay(std::size_t axis) const {
   const config::AxisConfig& config = configs_[axis];
   const axis::AxisLimits& lowest = lowest_limits_[axis];
   double time = 0.5 * config.max_speed / lowest.deceleration + motor::shapingTimeOf(config) +
-                static_cast<double>(kLongestLead) * 1e-9;
+                static_cast<double>(kLongestLead + aheadOf(schedule_)) * 1e-9;
   if (lowest.jerk > 0.0) time += (config.deceleration + config.acceleration) / lowest.jerk;
   return config.max_speed * time * config.steps_per_unit;
 }
@@ -879,6 +951,11 @@ void Participants::widenHull(const Ask& asked, std::size_t axis) {
 
 void Participants::checkHull(std::size_t axis) {
   if (steps_failed_[axis]) return;
+  // Until they are taken back, the steps of other motors that it shares go out.
+  const auto& shared = configs_[axis].kinematics;
+  for (std::size_t i = 0; port_ && shared && i < shared->axes.size(); ++i) {
+    if (steps_failed_[i]) return;
+  }
   const std::string broken = hulls_[axis].broken();
   if (!broken.empty()) oracle_.complain(configs_[axis].name + " " + broken + " microsteps");
 }
@@ -1198,11 +1275,11 @@ void Participants::appendToPath(int client, std::size_t axis, double size, bool 
                            : std::shared_ptr<const motion::QueuedPath>();
   if (!queued) return note("there is no path to append to");
   const pulse::Nanoseconds now = clock_.now() - engine_->state().slipped;
-  constexpr pulse::Nanoseconds kAppendLead = 20'000'000;
+  const pulse::Nanoseconds append_lead = engine_->horizon() + 20 * kMillisecond;
   const double passed = path->along->stateAt(now).position.value();
   const double changeable = path->slows_down
                                 ? path->along->endPosition().value()
-                                : path->along->stateAt(now + kAppendLead).position.value();
+                                : path->along->stateAt(now + append_lead).position.value();
   machine::ExtendPath wanted{axis, path->move, {queued, nullptr, passed, passed, true, {}}};
   try {
     std::vector<motion::PathSegment> segments;
@@ -1318,7 +1395,8 @@ void Participants::breakChip(std::size_t axis) {
 
 // Participants that wait for their turn may see the loss much later.
 void Participants::checkPowered(std::size_t axis, pulse::Nanoseconds now) {
-  if (!power_lost_since_ || now <= *power_lost_since_ + kLossIsSeen) return;
+  if (!power_lost_since_) return;
+  if (now <= *power_lost_since_ + kLossIsSeen + takingBack(schedule_)) return;
   if (!schedule_.deviations.empty()) return;
   oracle_.complain(configs_[axis].name + " steps long after the motor power was lost");
 }
@@ -1401,6 +1479,7 @@ activity::Reply Participants::ask(const std::string& name, machine::Request requ
 bool Participants::atRest() {
   if (!open_.empty() || !requests_.empty() || !jobs_.empty() || !pins_done_.empty()) return false;
   if (core_->hasNews() || clock_.woken || core_->isHeldUp()) return false;
+  if (port_ && port_->playDue() != pulse::kNever) return false;
   for (std::size_t i = 0; i < kAxes; ++i) {
     if (engine_->channel(static_cast<int>(i)).following != 0) return false;
   }

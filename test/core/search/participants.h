@@ -24,6 +24,7 @@
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/sim/rig.h"
+#include "support/ahead_port.h"
 #include "trajectory/prepared_trajectory.h"
 
 namespace stepdriver::search {
@@ -41,8 +42,9 @@ enum class Who {
   kClientA,
   kClientB,
   kClock,
+  kBoard,  ///< what plays the steps that were put ahead of time; not with a GpioPort
 };
-constexpr std::size_t kParticipants = 11;
+constexpr std::size_t kParticipants = 12;
 const char* nameOf(Who who);
 
 /// From the n-th step after the script's first request, a participant has to wait for some steps.
@@ -67,6 +69,13 @@ constexpr std::size_t kVariants = 5;
 /// The axes of one of them, as it is configured by default.
 std::vector<config::AxisConfig> configsOf(int variant);
 
+/// A port that takes steps ahead of time.
+struct Ahead {
+  pulse::Nanoseconds horizon = 0;
+  pulse::Nanoseconds late = 0;  ///< by how much it plays them later than planned; below 0: earlier
+  pulse::Nanoseconds take_back = 0;  ///< how long it plays on when they are taken back
+};
+
 /// Everything that determines the course of a run.
 struct Schedule {
   int variant = 0;
@@ -75,6 +84,8 @@ struct Schedule {
   bool may_last = false;  ///< its motions may take longer than a run; a stop ends them
   /// Other axes than configsOf(), with the same lines; empty: those.
   std::vector<config::AxisConfig> machine{};
+  /// The steps go out by a port of this kind; empty: by a GpioPort.
+  std::optional<Ahead> ahead{};
 };
 
 class Participants;
@@ -235,6 +246,9 @@ class Participants : private machine::ShellCore::Host {
   bool hasTurn(const Client& client) const;
   void beginTurn(int client);
   void pauseBeforeTurn(Client& client);
+  bool engineIsDue();
+  bool boardIsDue();
+  pulse::Nanoseconds latestTime();
   pulse::Nanoseconds nextDue();
   void advanceTo(pulse::Nanoseconds time);
   std::vector<int> readInputs();
@@ -270,6 +284,7 @@ class Participants : private machine::ShellCore::Host {
   /// @name Where the pulses may lead, on the rig [configured microsteps]
   /// @{
   double placeOnRig(std::size_t axis) const;
+  double untoldOf(std::size_t axis) const;
   double roundingOf(std::size_t axis) const;
   double onRig(std::size_t axis, double position);
   bool mayRest(std::size_t axis, std::uint64_t call);
@@ -305,6 +320,7 @@ class Participants : private machine::ShellCore::Host {
   gpio::SimulatedBackend backend_;
   machine::Wiring wiring_;
   std::shared_ptr<FailingReads> lines_;
+  std::unique_ptr<test::AheadPort> port_;  // null: the engine has its own
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<machine::Controller> controller_;
   std::unique_ptr<machine::ShellCore> core_;

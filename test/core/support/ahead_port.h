@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <mutex>
@@ -11,6 +12,9 @@
 #include <vector>
 
 #include "channel/channel_config.h"
+#include "channel/channel_state.h"
+#include "channel/watched_lines.h"
+#include "guard/axis_guard.h"
 #include "port/pulse_train.h"
 #include "port/step_port.h"
 #include "stepdriver_core/gpio/lines.h"
@@ -18,7 +22,7 @@
 
 namespace stepdriver::test {
 
-/// A port that plays steps ahead of time, as a board with firmware of its own does: it takes them
+/// A port that takes steps ahead of time, as a board with firmware of its own does: it takes them
 /// long before their times, plays them early or late by its own clock, watches the switches itself,
 /// and gives steps back only when it gets round to it.
 ///
@@ -34,6 +38,8 @@ class AheadPort final : public pulse::StepPort {
     std::function<Nanoseconds(const Step& step)> late = [](const Step& /*step*/) {
       return Nanoseconds{0};
     };
+    /// How long a takeBack() is on its way to the board, which plays what is due until then.
+    Nanoseconds take_back = 0;
   };
 
   /// @param lines, clock outlive this.
@@ -41,11 +47,14 @@ class AheadPort final : public pulse::StepPort {
             Habits habits)
       : StepPort(channels.size()),
         lines_(lines),
+        watched_(lines),
         clock_(clock),
         habits_(std::move(habits)),
         configs_(std::move(channels)),
         pins_(configs_.size()) {
-    for (std::size_t i = 0; i < configs_.size(); ++i) tracks_.emplace_back(configs_[i], pins_[i]);
+    for (std::size_t i = 0; i < configs_.size(); ++i) {
+      tracks_.emplace_back(configs_[i], pins_[i], watched_);
+    }
   }
 
   /// @name The engine's side
@@ -59,9 +68,16 @@ class AheadPort final : public pulse::StepPort {
     lanes_[step.channel].last = step.time;
     lanes_[step.channel].takes = step.time;
   }
+  void begin(std::size_t channel, const Squaring& squaring) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    tracks_[channel].state.still = squaring.still;
+    tracks_[channel].guard.begin(squaring.squares, squaring.is_square);
+  }
   void takeBack(std::size_t channel) override {
     const std::lock_guard<std::mutex> lock(mutex_);
-    tracks_[channel].taken_back = !tracks_[channel].open.empty();
+    Track& track = tracks_[channel];
+    if (track.open.empty()) return;
+    track.taken_back = std::min(track.taken_back, clock_.now() + habits_.take_back);
   }
   void serve(Nanoseconds /*now*/) override {
     {
@@ -80,18 +96,37 @@ class AheadPort final : public pulse::StepPort {
   Nanoseconds playDue() {
     const std::lock_guard<std::mutex> lock(mutex_);
     Nanoseconds due = pulse::kNever;
-    for (Track& track : tracks_) due = std::min(due, track.taken_back ? 0 : dueOf(track));
+    for (const Track& track : tracks_) due = std::min({due, track.taken_back, dueOf(track)});
     return due;
+  }
+  /// When the oldest open step was to be played; kNever: no step is open.
+  Nanoseconds oldestStep() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    Nanoseconds oldest = pulse::kNever;
+    for (const Track& track : tracks_) {
+      if (!track.open.empty()) oldest = std::min(oldest, track.open.front().plays);
+    }
+    return oldest;
   }
   /// Plays what is due, and gives back what was taken back.
   void play(Nanoseconds now) {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::size_t before = told_.size();
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
-      if (tracks_[i].taken_back) giveBack(i);
-      while (dueOf(tracks_[i]) <= now) playEdge(i);
+      Track& track = tracks_[i];
+      for (;;) {
+        const Nanoseconds due = dueOf(track);
+        if (track.taken_back <= std::min(now, due)) giveBack(i);
+        if (dueOf(track) > now) break;
+        playEdge(i);
+      }
     }
     if (told_.size() != before) clock_.wake();
+  }
+  /// [microsteps] The steps that have gone out, of which the engine hasn't heard.
+  std::int64_t untold(std::size_t channel) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return tracks_[channel].untold;
   }
   /// @}
 
@@ -100,14 +135,25 @@ class AheadPort final : public pulse::StepPort {
     Step step;
     Nanoseconds plays = 0;  // by the board's clock
   };
+  struct Played {
+    Step step;
+    Nanoseconds time = 0;
+  };
   struct Track {
-    Track(const pulse::ChannelConfig& channel_config, Lane& lane)
-        : config(channel_config), pin(lane), train(channel_config, lane) {}
+    Track(const pulse::ChannelConfig& channel_config, Lane& lane, pulse::WatchedLines& lines)
+        : config(channel_config),
+          pin(lane),
+          train(channel_config, lane),
+          guard(channel_config, state, lines) {}
     const pulse::ChannelConfig& config;
     const Lane& pin;
     pulse::PulseTrain train;
+    pulse::ChannelState state;  // as the board knows it
+    pulse::AxisGuard guard;
     std::deque<Open> open;
-    bool taken_back = false;
+    std::optional<Played> out;  // its pulse hasn't ended
+    std::int64_t untold = 0;
+    Nanoseconds taken_back = pulse::kNever;  // when that arrives
   };
 
   static Nanoseconds dueOf(const Track& track) {
@@ -120,19 +166,37 @@ class AheadPort final : public pulse::StepPort {
   void playEdge(std::size_t channel) {
     Track& track = tracks_[channel];
     if (track.pin.busy) {
-      if (write(channel)) track.train.fall(clock_.now());
-      return;
+      if (!write(channel)) return;
+      track.train.fall(clock_.now());
+      return tellPlayed(channel);
     }
-    const Step step = track.open.front().step;
+    Step step = track.open.front().step;
     if (track.pin.direction != step.direction) return turn(channel, step.direction);
-    if (const auto reason = forbidden(track, step)) return stop(channel, *reason);
+    if (const auto reason = forbidden(channel, step)) return stop(channel, *reason);
+    step.still |= track.state.still;
     track.train.beginPulse(step.still);
     if (!write(channel)) return;
     const Nanoseconds now = clock_.now();
     track.train.rise(now);
     track.open.pop_front();
-    told_.emplace_back(
-        [=](Listener& listener) { listener.played(channel, step.direction, step.still, now); });
+    for (std::size_t i = 0; i < track.train.motors(); ++i) {
+      if ((step.still & pulse::motorBit(i)) != 0) track.state.lags.at(i) -= step.direction;
+    }
+    track.out = Played{step, now};
+    track.untold += step.direction;
+    if (!track.pin.busy) tellPlayed(channel);
+  }
+
+  void tellPlayed(std::size_t channel) {
+    if (!tracks_[channel].out) return;
+    told_.emplace_back([this, channel, out = *tracks_[channel].out](Listener& listener) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        tracks_[channel].untold -= out.step.direction;
+      }
+      listener.played(channel, out.step.direction, out.step.still, out.time);
+    });
+    tracks_[channel].out.reset();
   }
 
   bool write(std::size_t channel) {
@@ -158,6 +222,7 @@ class AheadPort final : public pulse::StepPort {
     Track& track = tracks_[channel];
     const Nanoseconds now = clock_.now();
     const bool is_step = !track.pin.busy && !track.open.empty();
+    tellPlayed(channel);
     track.train.failed(now);
     if (is_step) track.open.pop_front();  // it may have gone out
     const pulse::LineFailure failure{error, writes->output};
@@ -169,41 +234,37 @@ class AheadPort final : public pulse::StepPort {
     return false;
   }
 
-  // A condition of a step that isn't fulfilled.
-  std::optional<std::pair<pulse::EndReason, pulse::LineFailure>> forbidden(const Track& track,
-                                                                           const Step& step) {
-    for (std::size_t i = 0; i < track.train.motors(); ++i) {
-      const pulse::MotorSignals& motor = i == 0 ? track.config : track.config.twins[i - 1];
-      const bool forward = step.direction > 0;
-      const auto& endstop = forward ? motor.endstop_max : motor.endstop_min;
-      const auto reason = forward ? pulse::EndReason::kEndstopMax : pulse::EndReason::kEndstopMin;
-      if (endstop && (step.still & pulse::motorBit(i)) == 0) {
-        const int level = lines_.read(endstop->line);
-        if (level < 0) {
-          return std::pair(pulse::EndReason::kLineError,
-                           pulse::LineFailure{-level, endstop->line, true});
-        }
-        if ((level != 0) == endstop->active) return std::pair(reason, pulse::LineFailure{});
+  // A condition that the step doesn't fulfil.
+  std::optional<Stop> forbidden(std::size_t channel, const Step& step) {
+    const Track& track = tracks_[channel];
+    for (std::size_t i = 0; i < track.train.motors() && !track.config.ramps_at_fault; ++i) {
+      const auto& fault = i == 0 ? track.config.fault : track.config.twins[i - 1].fault;
+      if (!fault) continue;
+      const int level = lines_.read(fault->line);
+      if (level >= 0 && (level != 0) == fault->active) {
+        return Stop{pulse::EndReason::kChipFault, channel, i, {}, 0};
       }
-      if (motor.fault && !track.config.ramps_at_fault) {
-        const int level = lines_.read(motor.fault->line);
-        if (level >= 0 && (level != 0) == motor.fault->active) {
-          return std::pair(pulse::EndReason::kChipFault, pulse::LineFailure{});
-        }
+    }
+    for (std::size_t lane = 0; lane < tracks_.size(); ++lane) {
+      const int forward = (step.forward & laneBit(lane)) != 0 ? 1 : 0;
+      const int direction = (step.backward & laneBit(lane)) != 0 ? -1 : forward;
+      if (direction == 0) continue;
+      Track& axis = tracks_[lane];
+      if (const auto objection = axis.guard.mayStep(direction)) {
+        return Stop{objection->reason, lane, 0, objection->failure, axis.state.still};
       }
     }
     return std::nullopt;
   }
 
-  void stop(std::size_t channel, const std::pair<pulse::EndReason, pulse::LineFailure>& why) {
+  void stop(std::size_t channel, const Stop& why) {
     giveBack(channel);
-    told_.emplace_back(
-        [=](Listener& listener) { listener.stopped(channel, why.first, why.second, 0); });
+    told_.emplace_back([=](Listener& listener) { listener.stopped(channel, why); });
   }
 
   void giveBack(std::size_t channel) {
     Track& track = tracks_[channel];
-    track.taken_back = false;
+    track.taken_back = pulse::kNever;
     if (track.open.empty()) return;
     told_.emplace_back([channel, steps = track.open.size()](Listener& listener) {
       listener.givenBack(channel, steps);
@@ -212,6 +273,7 @@ class AheadPort final : public pulse::StepPort {
   }
 
   gpio::Lines& lines_;
+  pulse::WatchedLines watched_;
   pulse::Clock& clock_;
   const Habits habits_;
   const std::vector<pulse::ChannelConfig> configs_;
