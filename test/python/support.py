@@ -34,6 +34,12 @@ def axis(**changes):
     return {key: value for key, value in config.items() if value is not None}
 
 
+def slowly_homed():
+    """An axis whose homing takes minutes, so that it can't end before a test ends it."""
+    homing = axis()["homing"]
+    return axis(homing={**homing, "seek_speed_mm_s": 0.02, "latch_speed_mm_s": 0.02})
+
+
 def plain(pins, **changes):
     """An axis with three pins, and nothing else."""
     names = dict(zip(("step", "dir", "enable"), pins))
@@ -61,9 +67,11 @@ class MachineTest(unittest.TestCase):
         return machine
 
     def held_move(self, machine, position=0.1):
-        """A move that doesn't end by itself."""
+        """A move that doesn't end by itself, however long this thread has to wait for a processor."""
+        machine.set_speed_override(0.01)  # At this speed the move would take minutes.
         move = machine["x"].move_to(position)
         machine.hold()
+        machine.set_speed_override(1.0)
         return move
 
     def assert_chip_is_well(self, machine=None):
