@@ -90,7 +90,7 @@ TEST_F(NamedLines, AreSafeAfterAnEmergencyStopAndRefusedUntilRecover) {
   EXPECT_TRUE(set("pen", true).success);
   const SetOutput::Response unknown = set("pan", true);
   EXPECT_FALSE(unknown.success);
-  expectSays(unknown.message, "there is no output pan; there are pen, relay");
+  expectSays(unknown.message, "there is no output pan (outputs: pen, relay)");
 }
 
 TEST_F(NamedLines, AreInTheDiagnosticsWithTheirErrors) {

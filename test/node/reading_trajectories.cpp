@@ -86,7 +86,7 @@ TEST(ReadingTrajectories, TakesAllThatAPointHas) {
 
 TEST(ReadingTrajectories, RefusesJointsThatAreNotThereNoneAndOneTwice) {
   using Kind = BadTrajectory::Kind;
-  expectBadMessage(Kind::kJoints, "no joint wrist; there are elbow, shoulder",
+  expectBadMessage(Kind::kJoints, "no joint wrist (joints: elbow, shoulder)",
                    message({"shoulder", "wrist"}, {1.0}));
   expectBadMessage(Kind::kJoints, "names no joint", message({}, {1.0}));
   expectBadMessage(Kind::kJoints, "elbow is named twice",

@@ -159,7 +159,7 @@ TEST_F(TrajectoryActionTest, RejectsWhatIsNoTrajectoryForItsAxes) {
     return goal;
   };
   expectRejected(changed([](Goal& g) { g.trajectory.joint_names[1] = "wrist"; }),
-                 Result::INVALID_JOINTS, "no joint wrist; there are x_joint, y_joint");
+                 Result::INVALID_JOINTS, "no joint wrist (joints: x_joint, y_joint)");
   expectRejected(changed([](Goal& g) { g.trajectory.joint_names[1] = "x_joint"; }),
                  Result::INVALID_JOINTS, "named twice");
   expectRejected(Goal(), Result::INVALID_JOINTS, "names no joint");

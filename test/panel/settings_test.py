@@ -25,7 +25,7 @@ class Settings(unittest.TestCase):
                              ({"port": -1}, "port is -1"), ({"port": "80"}, "port is '80'"), ({"port": True}, "port is True"),
                              ({"listen": ""}, "listen is ''"), ({"driver": 3}, "driver is 3"), ({"driver": " a"}, "driver is"),
                              ({"hosts": "a"}, "hosts is 'a', but must be a list of names"), ({"hosts": [1]}, "hosts is [1]"),
-                             ({"prot": 80}, "prot: there is no such parameter; there are driver, listen, port, hosts"),
+                             ({"prot": 80}, "prot: there is no such parameter (parameters: driver, listen, port, hosts)"),
                              ([], "must be a map")):
             with self.assertRaises(Refusal) as refused:
                 settings_of(wrong)

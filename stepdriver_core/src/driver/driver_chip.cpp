@@ -24,8 +24,8 @@ const DriverChip* findDriverChip(const std::string& name) {
 const DriverChip& driverChip(const std::string& name) {
   const DriverChip* const chip = findDriverChip(name);
   if (chip != nullptr) return *chip;
-  throw Error(fmt::format("there is no driver chip named \"{}\"; there are {}", printable(name),
-                          listText(driverChipNames(), "and")));
+  throw Error(fmt::format("there is no driver chip named \"{}\" (drivers: {})", printable(name),
+                          fmt::join(driverChipNames(), ", ")));
 }
 
 std::vector<std::string> driverChipNames() {

@@ -144,7 +144,7 @@ void NamedOutputs::set(const std::string& name, bool on, const SharedCall& call)
     throw Refused(fmt::format("there is no output {}: none is configured", printable(name)));
   }
   throw Refused(
-      fmt::format("there is no output {}; there are {}", printable(name),
+      fmt::format("there is no output {} (outputs: {})", printable(name),
                   joinedText(outputs_, [](const NamedOutput& output) { return output.name(); })));
 }
 

@@ -201,7 +201,7 @@ sim::MotorLimits limitsOf(const AxisConfig& axis, double steps_per_unit) {
 
 sim::MotorLimits motorLimits(const std::vector<AxisConfig>& axes, std::size_t axis) {
   if (axis >= axes.size()) {
-    throw Error(fmt::format("there is no axis number {}; there are {}", axis, axes.size()));
+    throw Error(fmt::format("there is no axis number {} (axes: {})", axis, axes.size()));
   }
   const AxisConfig& own = axes[axis];
   if (own.kinematics == nullptr) return limitsOf(own, own.steps_per_unit);

@@ -23,7 +23,7 @@ def settings_of(parameters):
     """The settings by their names. Raises a Refusal that names each parameter that is wrong."""
     if not isinstance(parameters, dict):
         raise Refusal(f"the parameters are {parameters!r}, but must be a map")
-    wrong = [f"{key}: there is no such parameter; there are {', '.join(CHECKS)}" for key in parameters
+    wrong = [f"{key}: there is no such parameter (parameters: {', '.join(CHECKS)})" for key in parameters
              if key not in CHECKS]
     settings = {**DEFAULTS, **parameters}
     wrong += [f"{key} is {settings[key]!r}, but {allowed}" for key, (is_right, allowed) in CHECKS.items()

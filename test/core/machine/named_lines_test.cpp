@@ -111,7 +111,7 @@ TEST_F(NamedLines, OutputsBeginAsConfiguredAndAreSwitchedByName) {
 TEST_F(NamedLines, UnknownNamesAreRefusedWithThoseThatThereAre) {
   begin();
   EXPECT_REFUSED(bench->machine->setOutput("pan", true),
-                 "there is no output pan; there are pen, clamp");
+                 "there is no output pan (outputs: pen, clamp)");
   EXPECT_REFUSED(bench->machine->setOutput("", true), "there is no output ");
   EXPECT_REFUSED(bench->machine->setOutput("probe", true), "there is no output probe");
   options.outputs.clear();

@@ -66,14 +66,14 @@ AxisOfJoint axisOfJoint(const machine::Machine& machine) {
 
 std::vector<std::string> axesOf(const std::vector<std::string>& joints, const AxisOfJoint& axes) {
   if (joints.empty()) {
-    throw BadTrajectory(Wrong::kJoints, "it names no joint; there are " + namesOf(axes));
+    throw BadTrajectory(Wrong::kJoints, "it names no joint (joints: " + namesOf(axes) + ")");
   }
   std::vector<std::string> found;
   for (const std::string& joint : joints) {
     const auto axis = axes.find(joint);
     if (axis == axes.end()) {
       throw BadTrajectory(Wrong::kJoints,
-                          fmt::format("there is no joint {}; there are {}", joint, namesOf(axes)));
+                          fmt::format("there is no joint {} (joints: {})", joint, namesOf(axes)));
     }
     if (std::find(found.begin(), found.end(), axis->second) != found.end()) {
       throw BadTrajectory(Wrong::kJoints, "the joint " + joint + " is named twice");
