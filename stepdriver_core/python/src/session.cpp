@@ -10,7 +10,7 @@ namespace {
 
 namespace py = pybind11;
 
-// Of this process, protected by the GIL.
+// The sessions of this process, which the GIL protects.
 std::set<Session*>& sessions() {
   static auto* const all = new std::set<Session*>;  // is used until the process ends
   return *all;

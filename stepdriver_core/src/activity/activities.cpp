@@ -50,7 +50,7 @@ void Activities::begin(std::unique_ptr<Activity> activity, const EarlyEnd& why) 
 
 void Activities::takeOver(std::unique_ptr<Activity> activity) {
   std::vector<Predecessor> predecessors;
-  // By axis. An axis has several goals if the engine has not yet accepted the last one.
+  // For each axis. It has several goals if the engine has not yet accepted the last one.
   std::map<const axis::AxisModel*, std::vector<Predecessor>> companions;
   for (axis::AxisModel* axis : activity->axes()) {
     Activity* now = owner(*axis);

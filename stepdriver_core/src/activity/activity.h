@@ -97,7 +97,7 @@ class Activity {
   /// Whether it uses the levels of inputs.
   virtual bool watchesInputs() const { return false; }
 
-  /// @name For readers of the state
+  /// @name What readers of the state ask
   /// @{
   virtual Work work() const { return Work::kMoves; }
   virtual axis::HomingPhase homingPhase() const { return axis::HomingPhase::kNone; }

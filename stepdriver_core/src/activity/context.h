@@ -57,7 +57,7 @@ class Context : public AnswerSink {
   std::vector<std::unique_ptr<axis::AxisModel>> axes;
   MotorPower motor_power;
 
-  /// @name Of this turn
+  /// @name What belongs to this turn
   /// @{
   pulse::Nanoseconds now = 0;      ///< clock time
   pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
@@ -94,7 +94,7 @@ class Context : public AnswerSink {
 
  private:
   struct FollowCommand {
-    std::size_t index = 0;  // in Outputs::commands
+    std::size_t index = 0;  // its index in Outputs::commands
     std::uint64_t start = 0;
     std::shared_ptr<std::vector<pulse::Follow>> follows;
   };

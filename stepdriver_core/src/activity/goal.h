@@ -28,10 +28,10 @@ struct MotorsTogether {
 struct Setpoint {
   bool of_position = false;    ///< otherwise Goal::velocity is the setpoint
   double position = 0.0;       ///< [microsteps]
-  double velocity = 0.0;       ///< [microsteps/s] of the position
+  double velocity = 0.0;       ///< [microsteps/s] the velocity of the position
   std::int64_t reach_ns = 0;   ///< the position is reached then, with that velocity
   std::int64_t return_ns = 0;  ///< without another setpoint it comes to rest at the position then
-  double period = 0.0;         ///< [s] of the stream
+  double period = 0.0;         ///< [s] the stream's period
   std::int64_t until_ns = 0;   ///< without another setpoint it begins to come to rest then
 };
 
@@ -41,10 +41,10 @@ struct Goal {
 
   Kind kind = Kind::kMove;
   std::uint64_t move = 0;  ///< its number; 0: no client has requested it
-  /// [microsteps] Of a move or a setpoint of position; of a jog or a setpoint of velocity the
-  /// position at which it must stop, empty without a limit.
+  /// [microsteps] The target of a move or of a setpoint of position. For a jog or a setpoint of
+  /// velocity it is the position at which the axis must stop, empty without a limit.
   std::optional<std::int64_t> target;
-  double remainder = 0.0;  ///< [microsteps] of a move: the commanded position minus the target
+  double remainder = 0.0;  ///< [microsteps] the commanded position of a move minus the target
   /// [unit/s] As requested, without the override; of a jog or a setpoint of velocity with its sign.
   double velocity = 0.0;
   Setpoint setpoint;      ///< used by a kSetpoint only
@@ -52,7 +52,7 @@ struct Goal {
   MotorsTogether motors;
   /// Its steps are never late by more than a quarter of an interval: its end measures a place.
   bool measures = false;
-  motion::MotionLimits path_limits;  ///< [microsteps] of a kTogether: its path keeps them
+  motion::MotionLimits path_limits;  ///< [microsteps] the limits that the path of a kTogether keeps
   /// At the target the axis waits for a path that continues its own: it isn't the end.
   bool waits_at_target = false;
   std::shared_ptr<axis::Outcome<axis::MoveResult>> outcome;  ///< receives its result
@@ -89,7 +89,7 @@ struct Extension {
   motion::DoubleDouble same_until;
   bool moves_on =
       false;  ///< it leads beyond the end of the other; otherwise only that is known now
-  std::vector<double> targets;  ///< [microsteps] of each joint, the commanded position at its end
+  std::vector<double> targets;  ///< [microsteps] the commanded position of each joint at its end
 };
 
 /// Axes whose motions begin at the same motion time, and are independent from then on. The engine

@@ -110,11 +110,11 @@ class Homing : public Activity {
   pulse::ChannelState latched_;
   pulse::Nanoseconds slipped_before_ = 0;
   pulse::Nanoseconds slipped_ = 0;
-  double trigger_ = 0.0;  // [microsteps] of the joint
+  double trigger_ = 0.0;  // [microsteps] the joint's position
 
-  // Of motors that are made square.
+  // Only for motors that are made square.
   std::vector<std::size_t> to_align_;  // those that still have to move alone
-  std::int64_t skew_ = 0;              // [microsteps] that this homing has made up
+  std::int64_t skew_ = 0;              // [microsteps] the skew that this homing has made up
 };
 
 }  // namespace stepdriver::activity

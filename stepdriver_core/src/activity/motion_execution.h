@@ -99,12 +99,12 @@ class MotionExecution {
   /// The shared path and its end.
   struct Course {
     std::shared_ptr<const motion::SharedPath> path;
-    std::vector<double> targets;  // [microsteps] of each joint
+    std::vector<double> targets;  // [microsteps] one for each joint
   };
 
   /// An order that the engine has not yet handled.
   struct OpenOrder {
-    std::vector<std::uint64_t> serials;  // by axis; 0: it has no part in it
+    std::vector<std::uint64_t> serials;  // one for each axis; 0: it has no part in it
     Mode mode = Mode::kRun;
     Plans plans;
     Course course;
@@ -178,7 +178,7 @@ class MotionExecution {
   std::vector<SharedCall> calls_;                         // wait for the open orders
 };
 
-/// For a goal that isStreamed().
+/// Only for a goal that isStreamed().
 inline const EarlyEnd kEndedByHold{axis::MoveEnd::kStopped,
                                    "it was held, which ends jogs and setpoints"};
 

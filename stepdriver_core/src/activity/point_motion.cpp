@@ -234,7 +234,7 @@ std::int64_t stepsTo(const axis::AxisModel& axis, const Goal& goal) {
   return *goal.target - axis.jointCount();
 }
 
-// Of an axis that shares motors: its place between the steps of all of them.
+// The place of an axis that shares motors, between the steps of all of them.
 double restOf(const axis::AxisModel& axis, double end, const std::vector<Order>& together) {
   if (axis.sharers().empty()) return end;
   return axis.restWith([&](const axis::AxisModel& sharer) {

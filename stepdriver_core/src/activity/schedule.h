@@ -78,7 +78,7 @@ class Schedule {
     LaterMotion motion;
     std::uint64_t id = 0;
     std::uint64_t version = 0;  // how often it was planned
-    // By order:
+    // One of each for each order:
     std::vector<std::uint64_t> stops;
     std::vector<std::uint64_t> ended;  // motions of its axis
     std::vector<Source> from;

@@ -61,7 +61,7 @@ class AxisModel {
   double exactBacklash(int microsteps) const { return config.backlash * stepsPerUnit(microsteps); }
   /// The part of the backlash that is taken up, at rest: from 0 to 1.
   double takenUp() const;
-  /// [microsteps] In a mode. @param part see takenUp().
+  /// [microsteps] The count in a mode. @param part see takenUp().
   double takenUpIn(int microsteps, double part) const;
   std::int64_t jointCount() const { return motor.state().count - motor.state().slack; }
   /// [microsteps] The same of an axis that shares motors, whose steps may be parts of its own.

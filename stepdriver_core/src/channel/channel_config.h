@@ -37,7 +37,7 @@ constexpr std::size_t kMostMotors = 4;
 using MotorSet = std::uint8_t;
 constexpr MotorSet motorBit(std::size_t motor) { return static_cast<MotorSet>(1U << motor); }
 
-/// [microsteps] By motor of an axis.
+/// [microsteps] One for each motor of an axis.
 using MotorCounts = std::array<std::int32_t, kMostMotors>;
 
 /// [microsteps] How far apart some motors are that were square with other counts.
@@ -84,9 +84,9 @@ struct ChannelConfig : MotorSignals {
 /// channels early ends all of them.
 struct SharedAxes {
   std::vector<std::size_t> channels;
-  /// By motor: [microsteps of the motor] for a microstep of each axis.
+  /// For each motor: [microsteps of the motor] for a microstep of each axis.
   std::vector<std::vector<double>> matrix;
-  /// By axis: [microsteps of the axis] for a microstep of each motor.
+  /// For each axis: [microsteps of the axis] for a microstep of each motor.
   std::vector<std::vector<double>> inverse;
 };
 

@@ -51,14 +51,14 @@ struct ChannelState {
   MotorSet still = 0;        ///< the motors that make no steps in this motion, or the last one
   std::uint8_t chip_at_fault = 0;  ///< the motor whose chip has reported the last of chip_faults
   std::uint8_t unsettled = 0;      ///< the motor that kNotInPosition is about
-  Nanoseconds waited = 0;          ///< for the in-position output, before kNotInPosition
-  Nanoseconds end_lateness = 0;    ///< how late the pulse was that was not sent, for kTooLate
-  std::uint64_t epoch = 0;         ///< how many times the scale of `count` has changed
-  std::uint64_t chip_faults = 0;   ///< how many times the fault line became active
-  std::uint64_t line_errors = 0;   ///< failed writes and reads
-  Nanoseconds ready = 0;           ///< clock time before which no step goes out
-  /// By motor: its own edges forward minus those backward, less `count`. 0 for motors that have
-  /// made every step of the axis.
+  Nanoseconds waited = 0;  ///< how long it waited for the in-position output before kNotInPosition
+  Nanoseconds end_lateness = 0;   ///< how late the pulse was that was not sent, for kTooLate
+  std::uint64_t epoch = 0;        ///< how many times the scale of `count` has changed
+  std::uint64_t chip_faults = 0;  ///< how many times the fault line became active
+  std::uint64_t line_errors = 0;  ///< failed writes and reads
+  Nanoseconds ready = 0;          ///< clock time before which no step goes out
+  /// For each motor: its own edges forward minus those backward, less `count`. 0 for motors that
+  /// have made every step of the axis.
   MotorCounts lags{};
   /// @name Of an axis that shares motors: `count` is the whole microstep nearest to its place
   ///   by the motors' edges, and `pulses` and `rose` are those of the motor with its chip

@@ -27,7 +27,7 @@ class WatchedLines {
     return lines_.read(input);
   }
 
-  /// For any thread: the line that is at work, or was last. If that doesn't return, its chip
+  /// The line that is at work, or was last; any thread may ask. If that doesn't return, its chip
   /// doesn't answer. The error is ETIMEDOUT.
   LineFailure atWork() const {
     const int input = input_.load(std::memory_order_relaxed);

@@ -19,8 +19,8 @@
 namespace stepdriver::config {
 namespace {
 
-// Of a matrix times its inverse: the condition of one that may be used is at most 100, and doubles
-// have 1e-16.
+// The largest error of a matrix times its inverse: the condition of a matrix that may be used is at
+// most 100, and doubles have 1e-16.
 constexpr double kInverseError = 1e-9;
 
 /// A map can't have two keys of one name, so this isn't left to the reader.

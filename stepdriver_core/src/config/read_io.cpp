@@ -13,7 +13,8 @@
 namespace stepdriver::config {
 namespace {
 
-// From a millisecond, which the controller's thread can time, to a day.
+// [s] The longest time that an output may be on: at least a millisecond, which the controller's
+// thread can time, and at most a day.
 constexpr Range kMostOnSeconds{1e-3, 86'400.0};
 constexpr Range kLeastTimesMs{0.0, 60'000.0};
 constexpr Range kDebouncesMs{0.0, 1000.0};

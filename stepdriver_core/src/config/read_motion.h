@@ -15,7 +15,7 @@ struct MotionContext {
   std::optional<driver::Timing> timing;
   bool both_edges = false;   ///< each edge of STEP is a step
   std::string drivers_take;  ///< "the A4988 takes", for messages
-  /// Of the driver whose DIR must be held longest, below the axis.
+  /// The key, below the axis, of the driver whose DIR must be held longest.
   std::string dir_hold_key;
 };
 

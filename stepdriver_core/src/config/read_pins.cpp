@@ -39,7 +39,7 @@ const char* cwCcwKey(const PinName& name) { return name.pin == &Pins::step ? "cw
 
 bool isMicrostepPin(const PinName& name) { return name.from_0_key != nullptr; }
 
-// In the order of Bias.
+// The words in the order of Bias.
 const std::vector<std::string> kBiases = {"as_is", "pull_up", "pull_down", "disabled"};
 
 constexpr double kLongestSettlingMs = 60'000.0;

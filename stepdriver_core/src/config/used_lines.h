@@ -33,7 +33,7 @@ class UsedLines {
   void refuse(const std::string& key, const std::string& line, const User& user);
 
   std::vector<ConfigIssue>& issues_;
-  std::map<std::string, User> users_;  ///< by line
+  std::map<std::string, User> users_;  ///< the user of each line
 };
 
 }  // namespace stepdriver::config

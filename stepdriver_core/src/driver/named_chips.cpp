@@ -150,7 +150,7 @@ DriverChip tmc2209() {
   return chip;
 }
 
-/// In standalone mode, configured by CFG1 and CFG2 as a TMC2100 is (SilentStepStick FAQ).
+/// The chip in standalone mode, configured by CFG1 and CFG2 as a TMC2100 is (SilentStepStick FAQ).
 DriverChip tmc2130() {
   DriverChip chip;
   chip.name = "tmc2130";
@@ -266,7 +266,8 @@ DriverChip cl57t() {
   // Switches set the pulses of a revolution: any number of microsteps.
   chip.opto_inputs = true;
   chip.enable_on = kLow;  // the lit LED of ENA disables it
-  // Of a contact to ground with a pull-up: open at an alarm, so that a broken wire is one too.
+  // The alarm output is a contact to ground with a pull-up: it opens at an alarm, so that a broken
+  // wire is an alarm too.
   chip.fault_active = kHigh;
   chip.in_position_active = kLow;  // PEND closes in position: a broken wire means that it isn't
   chip.in_position_name = "PEND";

@@ -10,11 +10,11 @@ namespace {
 
 constexpr int kMostPasses = 30;
 constexpr int kHalvings = 30;
-constexpr std::size_t kMostNeighbours = 32;  // at each side
+constexpr std::size_t kMostNeighbours = 32;  // on each side of a corner
 constexpr double kMostTurning = 0.5;
-constexpr double kInside = 1.0 - 1e-9;  // so that rounding passes no end
+constexpr double kInside = 1.0 - 1e-9;  // keeps rounding errors from passing an end
 
-// (m(w) - |w|)/d for y = |w|/d
+// (m(w) - |w|)/d as a function of y = |w|/d.
 double roundingAt(double y) {
   return y < 1.0 ? kMidRounding + y * y * (0.75 - 0.125 * y * y) - y : 0.0;
 }
@@ -100,7 +100,7 @@ bool OverlappingBlends::allows(std::size_t index, double distance) const {
 void OverlappingBlends::widen(std::size_t index) {
   Corner& corner = corners_[index];
   if (corner.turn == 0.0 || corner.fixed) return;
-  // Twice the distance is within the neighbours that are counted.
+  // The rounding reaches at most half as far as the last neighbours that are counted.
   double high = kInside * std::min(corner.place - corner.begin, end_ - corner.place);
   if (index >= kMostNeighbours) {
     high = std::min(high, (corner.place - corners_[firstNear(index)].place) / 2.0);

@@ -5,18 +5,23 @@
 
 namespace stepdriver::motion {
 
-/// The distance of a corner from its rounding, m(0)/d, for a shift of 1: see Path.
+/// The distance of a corner from the middle of its rounding, m(0)/d, for a shift of 1; see Path.
 constexpr double kMidRounding = 3.0 / 8.0;
 
-/// Corners of lines, one after the other, whose roundings may overlap, see Path.
+/// The corners between consecutive lines, whose roundings may overlap; see Path.
 class OverlappingBlends {
  public:
-  /// @param begin [unit] of the first line, and `end` of the last one: no rounding is beyond them.
+  /// @param begin, end [unit] the begin of the first line and the end of the last one: no rounding
+  /// reaches beyond them.
   OverlappingBlends(double begin, double end) : begin_(begin), end_(end) {}
 
-  /// @param length of the line before it. @param turn sin(turn/2). @param distance of its rounding
-  ///   if it overlaps no other one. @param fixed its rounding can't be changed. @param kept [unit]
-  ///   the part of the line that is kept as it is, apart from fixed roundings.
+  /// Adds a corner.
+  ///
+  /// @param length the length of the line before it
+  /// @param turn sin(turn/2)
+  /// @param distance how far its rounding reaches if it overlaps no other one
+  /// @param fixed whether its rounding can't be changed
+  /// @param kept [unit] the part of the line that stays as it is, apart from fixed roundings
   void append(double length, double turn, double distance, double tolerance, bool fixed,
               double kept);
 
@@ -31,9 +36,9 @@ class OverlappingBlends {
     double least;
     double distance;
     double tolerance;
-    double begin;  // no rounding before it, if it isn't fixed
+    double begin;  // the rounding begins after this place, unless it is fixed
     bool fixed;
-    double taken = 0.0;  // of the tolerance, by fixed roundings
+    double taken = 0.0;  // the part of the tolerance that fixed roundings use
   };
 
   std::size_t firstNear(std::size_t corner) const;
@@ -44,7 +49,8 @@ class OverlappingBlends {
   void yieldToFixed();
   bool allows(std::size_t index, double distance) const;
   void widen(std::size_t index);
-  // Of the roundings where their sum exceeds a tolerance. Returns whether none did.
+  // Narrows the roundings at the places at which their sum exceeds a tolerance. Returns whether it
+  // exceeded none.
   bool narrow();
 
   double begin_;

@@ -14,16 +14,16 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kSmooth = 1e-6;                   // rad: no corner
-constexpr double kSharpest = 170.0 / 180.0 * kPi;  // rad: beyond that, it is a stop
-constexpr double kMostBend = 0.0108;               // of |n(w) - w|w||/(4 d^2)
-constexpr double kEven = 1e-6;                     // of the curvature: no jump
-constexpr double kGentle = 30.0 / 180.0 * kPi;     // rad: roundings may overlap
-constexpr double kLeastBlend = 0.01;               // of the resolution
-constexpr double kLeastRate = 1e-4;                // of a Bezier, of the sum of its handles
-constexpr double kHandle = 0.2;                    // of the resolution, of a Bezier at least
-constexpr double kRoundRadius = 1e-12;             // of a radius: rounding
-constexpr double kInLine = 1e-9;                   // sine of the angle of three points
+constexpr double kSmooth = 1e-6;  // [rad] a smaller change of direction is no corner
+constexpr double kSharpest = 170.0 / 180.0 * kPi;  // [rad] beyond that, the motion stops
+constexpr double kMostBend = 0.0108;               // the largest value of |n(w) - w|w||/(4 d^2)
+constexpr double kEven = 1e-6;  // a smaller change relative to the curvature is no jump
+constexpr double kGentle = 30.0 / 180.0 * kPi;  // [rad] up to this, roundings may overlap
+constexpr double kLeastBlend = 0.01;            // relative to the resolution
+constexpr double kLeastRate = 1e-4;             // of a Bezier, relative to the sum of its handles
+constexpr double kHandle = 0.2;  // the shortest handle of a Bezier, relative to the resolution
+constexpr double kRoundRadius = 1e-12;  // relative to a radius: a smaller difference is rounding
+constexpr double kInLine = 1e-9;        // the sine of the angle between points that are in line
 
 double norm(const std::vector<double>& vector) {
   double sum = 0.0;
@@ -31,7 +31,7 @@ double norm(const std::vector<double>& vector) {
   return std::sqrt(sum);
 }
 
-// Of the direction of a line, whose coefficients are two of each axis.
+// The norm of the direction of a line, which has two coefficients for each axis.
 double norm(const std::vector<double>& powers, std::size_t axes) {
   double sum = 0.0;
   for (std::size_t i = 0; i < axes; ++i) sum += powers[2 * i + 1] * powers[2 * i + 1];
@@ -44,10 +44,10 @@ double distanceOf(const std::vector<double>& a, const std::vector<double>& b) {
   return norm(way);
 }
 
-// The control points of a Bezier. With one at its end, the derivative would be 0 there: it is moved
-// by a length, towards the next control point that isn't there. That moves the curve by 4/9 of the
-// length or less. If both are at their ends, the curve is a straight line, and another one of its
-// parameters has them at thirds.
+// The control points of a Bezier. If one coincided with its end, the derivative would be 0 there.
+// It is therefore moved by `length` towards the next control point that lies elsewhere, which moves
+// the curve by 4/9 of the length or less. If both coincide with their ends, the curve is a straight
+// line; another parametrization of it has them at the thirds of the line.
 std::pair<std::vector<double>, std::vector<double>> awayFromEnds(const std::vector<double>& from,
                                                                  const CurveSegment& given,
                                                                  double length) {
@@ -74,8 +74,8 @@ std::pair<std::vector<double>, std::vector<double>> awayFromEnds(const std::vect
           second ? moved(given.end, given.control1, from) : given.control2};
 }
 
-// The point of a Bezier's derivative, a parabola, that is nearest to 0: tried where its distance
-// from 0 is least among many places, and then more closely around the best.
+// The least |p'| of a Bezier, whose derivative is a parabola. It is searched at many places first,
+// and then more closely around the best one.
 double leastRate(const std::vector<double>& powers, std::size_t axes) {
   const auto rate_at = [&](double u) {
     double sum = 0.0;
@@ -111,7 +111,8 @@ std::vector<double> jumpOf(const PathPoint& in, double rate_in, const PathPoint&
   return jump;
 }
 
-// The size of the part of a jump that changes the curvature: the one across the mean direction.
+// The size of the part of a jump that changes the curvature: the part at a right angle to the mean
+// direction.
 double acrossOf(const std::vector<double>& jump, const PathPoint& in, double rate_in,
                 const PathPoint& out, double rate_out) {
   double along = 0.0;
@@ -196,8 +197,8 @@ Path::Segment Path::placed(const std::vector<double>& from, const CurveSegment& 
   return segment;
 }
 
-// [1/unit] The largest |p''| of the half of a segment next to a corner, for a parameter with which
-// |p'| = 1 at the corner.
+// [1/unit] The largest |p''| in the half of a segment next to a corner, for a parameter that makes
+// |p'| equal to 1 at the corner.
 double Path::sharpest(const Segment& segment, double rate) const {
   switch (segment.shape) {
     case CurveSegment::Shape::kLine:
@@ -207,7 +208,7 @@ double Path::sharpest(const Segment& segment, double rate) const {
               2.0 * std::abs(segment.growth)) *
              std::abs(segment.angle) / (rate * rate);
     case CurveSegment::Shape::kBezier: {
-      // The second derivative is linear: largest at an end.
+      // The second derivative is linear, so it is largest at an end.
       double begin = 0.0;
       double end = 0.0;
       for (std::size_t i = 0; i < axes(); ++i) {
@@ -249,7 +250,7 @@ void Path::round(std::size_t corner, const CurveSegment& given, Continuity conti
   double distance = given.blend.value_or(0.0);
   if (!turns_back && !given.blend) {
     const double turning = kMidRounding * half_chord;
-    // turning d + bending d^2 = tolerance
+    // Solves turning d + bending d^2 = tolerance.
     const double bending = kMostBend * norm(jump);
     const double root = std::sqrt(turning * turning + 4.0 * bending * given.tolerance);
     distance = jump.empty() ? given.tolerance / turning : 2.0 * given.tolerance / (turning + root);
@@ -312,7 +313,7 @@ void Path::widen(const std::vector<CurveSegment>& given, bool continues) {
     if (!isGentle(first)) continue;
     std::size_t last = first;
     while (last + 2 < size() && isGentle(last + 1)) ++last;
-    // A collinear end needs nothing: it is no rounding, and doesn't stop.
+    // A collinear end needs nothing: there is no rounding and no stop.
     const bool open = continues && last + 2 == size();
     const double length = segments_[last + 1].begin.rate;
     OverlappingBlends corners(segments_[first].begin.blend,
@@ -337,11 +338,12 @@ void Path::widen(const std::vector<CurveSegment>& given, bool continues) {
   }
 }
 
-// Makes the rounding of a corner reach as far as this.
+// Makes the rounding of a corner reach this far.
 void Path::overlap(std::size_t corner, double distance) {
   segments_[corner].end.blend = segments_[corner + 1].begin.blend = distance;
   const std::vector<double>& shift = segments_[corner].end.shift;
-  double place = segments_[corner + 1].begin.rate;  // the end of the line, from the corner
+  // The distance from the corner to the end of the line.
+  double place = segments_[corner + 1].begin.rate;
   for (std::size_t i = corner + 2; i < size() && place < distance; ++i) {
     const double rate = norm(segments_[i].powers, axes());
     segments_[i].overlaps.push_back({-place, {rate, distance, shift, {}}});
@@ -355,10 +357,11 @@ void Path::overlap(std::size_t corner, double distance) {
   }
 }
 
-// @param first, last corners between lines at the end of the path.
+// @param first, last the first and the last of the corners between lines at the end of the path
 void Path::findOpen(std::size_t first, std::size_t last) {
   constexpr double kReaches = 1.0 - 1e-6;
-  double to_middle = segments_[last + 1].begin.rate / 2.0;  // of the last line, from the corner
+  // From the corner to the middle of the last line.
+  double to_middle = segments_[last + 1].begin.rate / 2.0;
   for (std::size_t i = last + 1; i-- > first;) {
     const double blend = segments_[i].end.blend;
     if (blend >= to_middle * kReaches) {
@@ -371,7 +374,7 @@ void Path::findOpen(std::size_t first, std::size_t last) {
   }
 }
 
-// The parameters up to which, and from which on, a segment is rounded.
+// A segment is rounded before the first of these parameters and after the second.
 std::pair<double, double> Path::rounded(std::size_t index) const {
   const Segment& segment = segments_[index];
   double until = segment.begin.blend > 0.0 ? segment.begin.blend / segment.begin.rate : 0.0;
@@ -428,7 +431,7 @@ void Path::evaluateGiven(std::size_t index, double u, PathPoint& point) const {
   point.second[a] = -x * segment.angle * segment.angle;
   point.second[b] = -y * segment.angle * segment.angle;
   if (segment.growth == 0.0) return;
-  const double rate = segment.growth / radius;  // of the radius, in parts of it
+  const double rate = segment.growth / radius;  // the change of the radius relative to it
   point.first[a] += x * rate;
   point.first[b] += y * rate;
   point.second[a] -= 2.0 * y * rate * segment.angle;
@@ -446,8 +449,8 @@ void Path::evaluate(std::size_t index, double u, PathPoint& point) const {
   }
 }
 
-// Adds shift (m(w) - |w|) + jump/4 (n(w) - w|w|), at a distance |w| from the corner, which is on
-// the side of w's sign.
+// Adds shift (m(w) - |w|) + jump/4 (n(w) - w|w|) at a distance |w| from the corner, on the side
+// that the sign of w tells.
 void Path::blend(const End& end, double distance, double sign, PathPoint& point) const {
   if (!(distance < end.blend)) return;
   const double y = distance / end.blend;
@@ -482,28 +485,29 @@ std::pair<double, double> Path::range(std::size_t index, std::size_t axis) const
   evaluateGiven(index, 0.0, point);
   double low = point.position[axis];
   double high = low;
-  const auto take = [&](double u) {
+  const auto include = [&](double u) {
     if (!(u > 0.0 && u <= 1.0)) return;
     evaluateGiven(index, u, point);
     low = std::min(low, point.position[axis]);
     high = std::max(high, point.position[axis]);
   };
-  take(1.0);
+  include(1.0);
   if (segment.shape == CurveSegment::Shape::kBezier) {
-    // c1 + 2 c2 u + 3 c3 u^2 = 0
+    // Solves c1 + 2 c2 u + 3 c3 u^2 = 0.
     const double* c = &segment.powers[4 * axis];
     const double root = std::sqrt(std::max(0.0, c[2] * c[2] - 3.0 * c[1] * c[3]));
     const double sum = -(c[2] + std::copysign(root, c[2]));
-    if (sum != 0.0) take(c[1] / sum);
-    if (c[3] != 0.0) take(sum / (3.0 * c[3]));
+    if (sum != 0.0) include(c[1] / sum);
+    if (c[3] != 0.0) include(sum / (3.0 * c[3]));
   }
   if (segment.shape == CurveSegment::Shape::kArc) {
     for (std::size_t k = 0; k < 2; ++k) {
       if (segment.plane[k] != axis) continue;
-      const double quarter = k == 0 ? 0.0 : kPi / 2.0;  // the angle of an extreme
+      // The angle at which this axis has an extreme.
+      const double quarter = k == 0 ? 0.0 : kPi / 2.0;
       const auto [least, most] = std::minmax({segment.from, segment.from + segment.angle});
-      // If the radius changes by g and the angle by b, the extremes are ahead of that by
-      // atan(g/(r b)).
+      // If the radius changes by g while the angle changes by b, the extremes lie beyond that angle
+      // by atan(g/(r b)).
       for (double turn = std::floor((least - quarter) / kPi); turn * kPi + quarter < most + kPi;
            ++turn) {
         double u = (turn * kPi + quarter - segment.from) / segment.angle;
@@ -513,7 +517,7 @@ std::pair<double, double> Path::range(std::size_t index, std::size_t axis) const
           const double ahead = std::atan(segment.growth / (radius * segment.angle));
           u = (turn * kPi + quarter + ahead - segment.from) / segment.angle;
         }
-        take(u);
+        include(u);
       }
     }
   }
@@ -543,7 +547,7 @@ Arc arcThrough(const std::array<double, 2>& from, const std::array<double, 2>& t
   if (!(std::abs(cross) > kInLine * std::sqrt(aa) * std::sqrt(bb)) || gap == 0.0) return {};
   std::array<double, 2> centre{from[0] + (by * aa - ay * bb) / (2.0 * cross),
                                from[1] + (ax * bb - bx * aa) / (2.0 * cross)};
-  // Rounding has moved it along the chord.
+  // Rounding errors have moved the centre along the chord.
   const double along =
       ((centre[0] - (from[0] + to[0]) / 2.0) * bx + (centre[1] - (from[1] + to[1]) / 2.0) * by) /
       bb;

@@ -9,38 +9,39 @@
 
 namespace stepdriver::motion {
 
-/// A segment of a path, from the end of the one before it. Numbers are in the units of the axes,
-/// one for each axis.
+/// A segment of a path. It begins at the end of the one before it. Numbers are in the units of the
+/// axes, one for each axis.
 struct CurveSegment {
   enum class Shape {
     kLine,
     /// A circular arc in the plane of two axes; the others move in proportion to its angle.
     kArc,
-    kBezier,  ///< cubic
+    kBezier,  ///< a cubic one
   };
   Shape shape = Shape::kLine;
   std::vector<double> end;
 
-  std::array<std::size_t, 2> plane{};  ///< of an arc: its axes
-  /// Of an arc. If its begin and its end aren't equally far from it, the radius changes evenly.
+  std::array<std::size_t, 2> plane{};  ///< the axes of an arc
+  /// The centre of an arc. If its begin and its end aren't equally far from the centre, the radius
+  /// changes evenly.
   std::array<double, 2> centre{};
-  double angle = 0.0;  ///< [rad] of an arc, from plane[0] towards plane[1]
+  double angle = 0.0;  ///< [rad] the angle of an arc, from plane[0] towards plane[1]
 
-  std::vector<double> control1;  ///< of a Bezier
+  std::vector<double> control1;  ///< the control points of a Bezier
   std::vector<double> control2;
 
-  /// [unit/s] Highest speed along it: the root of the sum of the squared speeds of its measured
-  /// axes.
+  /// [unit/s] The highest speed along the segment: the root of the sum of the squared speeds of its
+  /// measured axes.
   double speed = std::numeric_limits<double>::infinity();
-  std::vector<bool> measured;  ///< the axes of which this is the speed; empty: all
-  /// [unit] How far the corner at its end may be rounded; 0: an exact stop at the corner. It is
-  /// ignored at the end of the path and if there is no corner.
+  std::vector<bool> measured;  ///< the axes that this speed counts; empty: all of them
+  /// [unit] How far the corner at its end may be rounded; 0: the motion stops exactly at the
+  /// corner. It is ignored at the end of the path and if there is no corner.
   double tolerance = 0.0;
-  /// Up to this parameter the corner at its end leaves it as it is, and so do all later corners.
+  /// The rounding of the corner at its end, and of all later corners, begins after this parameter.
   double kept = 0.0;
-  std::size_t number = 0;  ///< its number in a refusal
-  /// [unit] How far the corner at its end is rounded, as Path::blendAfter() told of the same
-  /// corner, whatever else allows. Empty: as far as possible.
+  std::size_t number = 0;  ///< a refusal names it by this number
+  /// [unit] How far the rounding of the corner at its end reaches, as Path::blendAfter() returned
+  /// it for the same corner, whatever else would be allowed. Empty: as far as possible.
   std::optional<double> blend;
 };
 
@@ -51,10 +52,10 @@ struct PathPoint {
   std::vector<double> second;
 };
 
-/// What is continuous along a path wherever there is no stop.
+/// What is continuous along a path, except at stops.
 enum class Continuity {
   kDirection,
-  kCurvature,  ///< and the direction: the acceleration of a motion along it needn't jump
+  kCurvature,  ///< the direction, too: a motion along the path needs no jump of the acceleration
 };
 
 /// A curve of segments whose corners are rounded. Distances are the root of the sum of the squares
@@ -106,15 +107,15 @@ enum class Continuity {
 ///   or more.
 class Path {
  public:
-  /// A control point of a Bezier that is at its end, or nearer to it than a fifth of the
-  /// resolution, is moved away by that: the curve deviates by less than a tenth of the resolution.
+  /// If a control point of a Bezier is nearer to its end than a fifth of the resolution, it is
+  /// moved away by that distance. The curve deviates by less than a tenth of the resolution.
   ///
-  /// @param start one number for each axis. @param segments each one of a length above 0; at least
-  ///   one. @param resolution [unit] what makes no difference: a microstep of the finest axis.
-  /// @throw motion::Malformed if a Bezier's derivative is (almost) 0 at a point within it,
-  /// which
-  ///   no axis can pass without a stop; it names the segment (the first is 0).
-  /// @param continues more segments will be appended.
+  /// @param start one number for each axis
+  /// @param segments at least one; the length of each is above 0
+  /// @param resolution [unit] what makes no difference: a microstep of the finest axis
+  /// @param continues more segments will be appended
+  /// @throw motion::Malformed if a Bezier's derivative is (almost) 0 at a point within it, which no
+  ///   axis can pass without a stop. It names the segment (the first is 0).
   Path(std::vector<double> start, const std::vector<CurveSegment>& segments, double resolution,
        Continuity continuity = Continuity::kDirection, bool continues = false);
 
@@ -123,33 +124,33 @@ class Path {
   const std::vector<double>& start() const { return start_; }
   double resolution() const { return resolution_; }
 
-  /// @param parameter from 0 to 1.
+  /// The point at a parameter from 0 to 1.
   void evaluate(std::size_t segment, double parameter, PathPoint& point) const;
-  /// The same of the path as given, with all its corners.
+  /// The point of the path as given, with all its corners.
   void evaluateGiven(std::size_t segment, double parameter, PathPoint& point) const;
 
-  /// Some of its segments, rounded as they are here.
+  /// The segments from `first` to `last`, rounded as they are here.
   Path part(std::size_t first, std::size_t last) const;
-  /// The same with stops at some corners, which are not rounded.
+  /// The same path with stops at some corners, which are not rounded.
   ///
-  /// @param corners the segments that end at them; each one is separate.
+  /// @param corners the segments that end at these corners; each corner is separate.
   Path withStops(const std::vector<std::size_t>& corners) const;
-  /// Whether no rounding of another corner reaches the end of a segment, and its own one doesn't
-  /// reach beyond this segment and the next one.
+  /// Whether no rounding of another corner reaches the end of this segment, and the rounding there
+  /// doesn't reach beyond this segment and the next one.
   bool isSeparate(std::size_t corner) const;
 
   /// The lowest and the highest position of an axis on a segment as given.
   std::pair<double, double> range(std::size_t segment, std::size_t axis) const;
 
-  /// Up to which parameter of a segment the corner at its begin is rounded, and from which on the
-  /// one at its end: 0 and 1 if they aren't.
+  /// A segment is rounded from 0 to roundedUntil(), and from roundedFrom() to 1. They are 0 and 1
+  /// if it isn't rounded there.
   double roundedUntil(std::size_t segment) const;
   double roundedFrom(std::size_t segment) const;
-  /// [unit] How far from the end of a segment the rounding of that corner reaches, d; 0: it isn't
+  /// [unit] How far from the end of a segment the rounding of that corner reaches (d); 0: it isn't
   /// rounded.
   double blendAfter(std::size_t segment) const { return segments_[segment].end.blend; }
   bool isLine(std::size_t segment) const;
-  /// From here on the roundings of corners will change if the path is continued, as they must
+  /// If the path is continued, the roundings of corners will change from here on, because they must
   /// not reach beyond the middle of its last segment.
   struct Place {
     std::size_t segment = 0;
@@ -158,7 +159,7 @@ class Path {
   Place openFrom() const { return open_; }
   /// Whether the motion has to stop at the end of a segment.
   bool stopsAfter(std::size_t segment) const { return segments_[segment].stops; }
-  /// [unit/s] See CurveSegment.
+  /// [unit/s] See CurveSegment::speed.
   double speed(std::size_t segment) const { return segments_[segment].speed; }
   const std::vector<bool>& measured(std::size_t segment) const {
     return segments_[segment].measured;
@@ -167,27 +168,27 @@ class Path {
  private:
   // One end of a segment, and how its corner is rounded.
   struct End {
-    double rate = 0.0;          // |p'|
-    double blend = 0.0;         // d; 0: not at all
+    double rate = 0.0;          // |p'| there
+    double blend = 0.0;         // d; 0: the corner isn't rounded
     std::vector<double> shift;  // (t2 - t1)/2
-    std::vector<double> jump;   // c; empty: 0
+    std::vector<double> jump;   // c; empty if there is no jump
   };
   struct Segment {
     CurveSegment::Shape shape;
-    // Coefficients of the powers of the parameter, one after the other: 2 for each axis, or 4 of a
-    // Bezier. Of an arc, those of its two axes are unused.
+    // Coefficients of the powers of the parameter, one after the other: 2 for each axis, or 4 for a
+    // Bezier. For an arc, those of its two axes are unused.
     std::vector<double> powers;
     std::array<std::size_t, 2> plane{};
     std::array<double, 2> centre{};
     double radius = 0.0;  // at its begin
-    double growth = 0.0;  // of the radius, up to its end
-    double from = 0.0;    // rad
+    double growth = 0.0;  // by which the radius rises up to its end
+    double from = 0.0;    // [rad] the angle of its begin
     double angle = 0.0;
     End begin;
     End end;
-    // Of a line: corners of other segments whose rounding reaches it.
+    // The corners of other segments whose roundings reach this line.
     struct Overlap {
-      double place = 0.0;  // of the corner, from the begin of this line
+      double place = 0.0;  // the distance from the begin of this line to the corner
       End end;
     };
     std::vector<Overlap> overlaps;
@@ -218,12 +219,12 @@ struct Arc {
   double angle = 0.0;  ///< [rad]
 };
 
-/// From one point around a centre to another; a full turn if they are in the same direction from
-/// it.
+/// An arc around a centre from one point to another. It is a full turn if they are in the same
+/// direction from the centre.
 Arc arcAround(const std::array<double, 2>& from, const std::array<double, 2>& centre,
               const std::array<double, 2>& to, bool clockwise);
 
-/// From one point through a second one to a third.
+/// An arc from one point through a second one to a third.
 ///
 /// @return an angle of 0 if they are in line or if two of them are the same.
 Arc arcThrough(const std::array<double, 2>& from, const std::array<double, 2>& through,

@@ -10,16 +10,16 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kMostRateRatio = 1.3;       // of the parameter's rates in an interval
-constexpr double kMostArcDeviation = 0.005;  // of the resolution
-constexpr double kLeastPart = 1e-9;          // of a segment
-constexpr double kShortest = 1e-7;           // of a segment: not divided further
-// Of the length of an interval: after such a correction, what is left is rounding.
+constexpr double kMostRateRatio = 1.3;  // the ratio of the parameter's rates within an interval
+constexpr double kMostArcDeviation = 0.005;  // relative to the resolution
+constexpr double kLeastPart = 1e-9;          // relative to a segment; a shorter part is left out
+constexpr double kShortest = 1e-7;           // relative to a segment; it isn't divided further
+// Relative to the length of an interval: what is left after such a correction is rounding.
 constexpr double kSmallCorrection = 1e-7;
-constexpr int kPartsOfCorner = 5;        // at least, of each half
-constexpr double kGentleTurn = 0.1;      // [rad] of half of a corner
-constexpr int kPartsOfCurve = 4;         // at least
-constexpr std::size_t kUsualParts = 24;  // of a segment
+constexpr int kPartsOfCorner = 5;        // the fewest of each half
+constexpr double kGentleTurn = 0.1;      // [rad] half of a corner that turns by less is gentle
+constexpr int kPartsOfCurve = 4;         // the fewest
+constexpr std::size_t kUsualParts = 24;  // the usual number for a segment
 
 }  // namespace
 
@@ -62,8 +62,9 @@ int PathGrid::partsOfCorner(std::size_t segment, double to) {
   return turnOf(begin, end) < kGentleTurn ? fineness_.parts_of_gentle_half : kPartsOfCorner;
 }
 
-// The part of a segment from the first place in scratch_ on, which is then that of `to`: into
-// `parts` intervals, or more if they would be too long; one part is straight.
+// Divides a segment from the first place in scratch_ to the parameter `to` into `parts` intervals,
+// or more if they would be too long. A single part is straight. Afterwards the first place in
+// scratch_ is that of `to`.
 void PathGrid::divide(std::size_t segment, double to, int parts) {
   auto& [begin, middle, end] = scratch_;
   const double from = begin.parameter;
@@ -73,7 +74,7 @@ void PathGrid::divide(std::size_t segment, double to, int parts) {
     std::swap(begin, end);
     return;
   }
-  // Parameters of places, the next one last.
+  // The parameters of the places ahead; the next one is the last element.
   for (int i = 0; i < parts; ++i) ahead_.push_back(to + (from - to) * i / parts);
   evaluate(segment, ahead_.back(), end);
   while (true) {
@@ -101,7 +102,7 @@ Division PathGrid::divideEach(const std::vector<bool>& which, std::size_t parts)
   division.spread(derivatives_, 4 * axes_);
   division.spread(positions_, axes_);
   division.spread(stops_);
-  std::vector<Place> places(2 * parts + 1);  // with the middles of the parts
+  std::vector<Place> places(2 * parts + 1);  // the ends and the middles of the parts
   for (std::size_t i = 0; i < division.intervals.size(); ++i) {
     giveWayAt(i);
     const std::size_t first = division.firstPartOf(i);
@@ -144,7 +145,7 @@ PathGrid PathGrid::divided(const std::vector<double>& distances) const {
   made.derivatives_.clear();
   made.positions_.assign(position(0), position(0) + axes_);
   made.stops_.assign(1, stopsAt(0));
-  const auto take = [&](std::size_t of, const Interval& interval, const double* end) {
+  const auto keep = [&](std::size_t of, const Interval& interval, const double* end) {
     made.intervals_.push_back(interval);
     made.derivatives_.insert(made.derivatives_.end(), firstAtBegin(of),
                              firstAtBegin(of) + 4 * axes_);
@@ -152,7 +153,7 @@ PathGrid PathGrid::divided(const std::vector<double>& distances) const {
     made.stops_.push_back(false);
   };
   PathPoint point;
-  double begin = 0.0;  // distance from the start
+  double begin = 0.0;  // its distance from the start
   auto next = distances.begin();
   for (std::size_t i = 0; i < size(); ++i) {
     giveWayAt(i);
@@ -166,12 +167,12 @@ PathGrid PathGrid::divided(const std::vector<double>& distances) const {
       Interval part = rest;
       part.length = at - done;
       part.to = rest.from + (rest.to - rest.from) * part.length / rest.length;
-      take(i, part, point.position.data());
+      keep(i, part, point.position.data());
       rest.from = part.to;
       rest.length -= part.length;
       done = at;
     }
-    take(i, rest, position(i + 1));
+    keep(i, rest, position(i + 1));
     made.stops_.back() = stopsAt(i + 1);
     begin += intervals_[i].length;
   }
@@ -217,7 +218,7 @@ double PathGrid::evaluateAt(std::size_t interval, double distance, PathPoint& po
   }
   auto& [begin, middle, end] = scratch_;
   evaluate(of.segment, of.from, begin);
-  // With an even change of the rate.
+  // The first estimate assumes that the rate changes evenly.
   double change = 0.0;
   for (std::size_t j = 0; j < axes_; ++j) {
     change += begin.point.first[j] * begin.point.second[j] / begin.rate;
@@ -239,7 +240,7 @@ double PathGrid::evaluateAt(std::size_t interval, double distance, PathPoint& po
   return parameter;
 }
 
-// [rad] Nearly.
+// [rad] The turn from one place to another, almost exactly if it is small.
 double PathGrid::turnOf(const Place& begin, const Place& end) const {
   double square = 0.0;
   for (std::size_t i = 0; i < axes_; ++i) {
@@ -255,12 +256,13 @@ bool PathGrid::tooLong(const Place& begin, const Place& middle, const Place& end
   if (most > kMostRateRatio * least) return true;
   const double turn = turnOf(begin, middle) + turnOf(middle, end);
   if (turn > fineness_.most_turn) return true;
-  // Of a cubic from an arc of this length and turn, at a constant speed.
+  // The deviation of a cubic from an arc of this length and turn, at a constant speed.
   const double length = middle.rate * (end.parameter - begin.parameter);
   return length * turn * turn * turn / 384.0 > kMostArcDeviation * path_.resolution();
 }
 
-// Simpson's rule with the derivatives of |p'| at the ends, exact up to the fifth power.
+// Uses Simpson's rule with the derivatives of |p'| at the ends, which is exact up to the fifth
+// power.
 double PathGrid::lengthOf(const Place& begin, const Place& middle, const Place& end) const {
   double slopes = 0.0;
   for (std::size_t i = 0; i < axes_; ++i) {

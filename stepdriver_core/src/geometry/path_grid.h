@@ -9,9 +9,9 @@
 
 namespace stepdriver::motion {
 
-/// Which intervals of a grid have been divided, each into the same number of parts.
+/// The intervals of a grid that were divided, each into the same number of parts.
 struct Division {
-  std::vector<std::size_t> intervals;  ///< their former indices, in increasing order
+  std::vector<std::size_t> intervals;  ///< the indices that they had before, in increasing order
   std::size_t parts = 1;
 
   /// The index of the first part of one of `intervals`.
@@ -21,15 +21,15 @@ struct Division {
 
   /// Gives each part the values of the interval that was divided.
   ///
-  /// @param values `width` of them for each interval, or for each place.
+  /// @param values `width` of them for each interval or for each place
   template <typename Value>
   void spread(std::vector<Value>& values, std::size_t width = 1) const {
     const auto at = [&](std::size_t index) {
       return values.begin() + static_cast<std::ptrdiff_t>(index * width);
     };
-    std::size_t end = values.size() / width;  // of what hasn't been moved yet
+    std::size_t end = values.size() / width;  // what lies before it hasn't been moved yet
     values.resize(values.size() + intervals.size() * (parts - 1) * width);
-    // From the end on, nothing is replaced before it is moved.
+    // Values are moved from the end on, so that none is overwritten before it is moved.
     for (std::size_t which = intervals.size(); which-- > 0;) {
       const std::size_t begin = intervals[which];
       const std::size_t first = firstPartOf(which);
@@ -42,40 +42,40 @@ struct Division {
   }
 };
 
-/// A path divided into short intervals of its length s, each from one place to the next. A
+/// A path divided into short intervals of its length s. A place separates each from the next one. A
 /// straight part is one interval. Only one thread uses it at a time.
 class PathGrid {
  public:
   /// How finely a path is divided.
   struct Fineness {
-    double most_turn;          ///< [rad] of an interval
-    int parts_of_gentle_half;  ///< at least, of half a corner that hardly turns
+    double most_turn;          ///< [rad] an interval turns by no more
+    int parts_of_gentle_half;  ///< the fewest intervals of half a corner that hardly turns
   };
-  /// @name If this is even along each interval
+  /// @name Finenesses, by what is even along each interval
   /// @{
   static constexpr Fineness kForSpeed{0.12, 5};
-  static constexpr Fineness kForAcceleration{0.28, 2};  ///< that of each axis
+  static constexpr Fineness kForAcceleration{0.28, 2};  ///< the acceleration of each axis
   /// @}
 
-  /// @param begin the parameter of the first segment at which it begins.
+  /// @param begin the parameter of the first segment at which the grid begins
   explicit PathGrid(const Path& path, double begin = 0.0, const Fineness& fineness = kForSpeed);
 
   struct Interval {
     double length = 0.0;  ///< [unit]
     std::size_t segment = 0;
     bool straight = false;
-    double from = 0.0;  ///< the parameters of the segment at its ends
+    double from = 0.0;  ///< the parameters of the segment at the interval's ends
     double to = 0.0;
   };
 
-  /// Divides some of the intervals that aren't straight, each into this many.
+  /// Divides the intervals that `which` marks, except straight ones, into this many parts each.
   Division divideEach(const std::vector<bool>& which, std::size_t parts);
 
-  /// With straight intervals divided at some distances from the start.
+  /// The same grid with straight intervals divided at these distances from the start.
   ///
-  /// @param distances in increasing order.
+  /// @param distances in increasing order
   PathGrid divided(const std::vector<double>& distances) const;
-  /// From a distance from its start on, which is before its end.
+  /// The grid of what lies beyond a distance from its start, which is less than its length.
   PathGrid after(double distance) const;
 
   std::size_t axes() const { return axes_; }
@@ -85,11 +85,11 @@ class PathGrid {
   /// How many intervals it may have without needing more memory.
   std::size_t capacity() const { return intervals_.capacity(); }
   const Interval& operator[](std::size_t index) const { return intervals_[index]; }
-  /// Of the place before an interval; with the index size(), of the end.
+  /// [unit] The position at the place before an interval; with the index size(), at the end.
   const double* position(std::size_t place) const { return &positions_[place * axes_]; }
-  /// At a corner, and at the end.
+  /// Whether the motion stops at a place: at a corner, and at the end.
   bool stopsAt(std::size_t place) const { return stops_[place] != 0; }
-  /// The point at the middle parameter of an interval, until another one is evaluated.
+  /// The point at the middle parameter of an interval. It is valid until another one is evaluated.
   const PathPoint& evaluateMiddle(std::size_t interval) const {
     const Interval& of = intervals_[interval];
     PathPoint& middle = scratch_.front().point;
@@ -97,14 +97,14 @@ class PathGrid {
     return middle;
   }
 
-  /// The point at a distance from the begin of an interval, with the derivatives with respect to s;
-  /// beyond an interval that isn't straight, its end.
+  /// The point at a distance from the begin of an interval, with its derivatives with respect to s.
+  /// A distance beyond the end of an interval that isn't straight gives its end.
   ///
-  /// @return its parameter.
+  /// @return the parameter of the point
   double evaluateAt(std::size_t interval, double distance, PathPoint& point) const;
 
   /// @name The first two derivatives of the position with respect to s, at the ends of an interval.
-  /// The second one jumps at a place if the curvature does; the first one only at a stop.
+  /// The second one jumps at a place if the curvature does; the first one jumps only at a stop.
   /// @{
   const double* firstAtBegin(std::size_t interval) const { return derivative(interval, 0); }
   const double* secondAtBegin(std::size_t interval) const { return derivative(interval, 1); }
@@ -141,10 +141,10 @@ class PathGrid {
   std::size_t axes_;
   std::vector<Interval> intervals_;
   std::vector<double> positions_;
-  std::vector<double> derivatives_;  // four of each interval
-  std::vector<char> stops_;          // whether, of each place
+  std::vector<double> derivatives_;  // four vectors for each interval
+  std::vector<char> stops_;          // whether the motion stops there, for each place
   mutable std::array<Place, 3> scratch_;
-  std::vector<double> ahead_;  // of divide()
+  std::vector<double> ahead_;  // the parameters that divide() has yet to reach
 };
 
 }  // namespace stepdriver::motion

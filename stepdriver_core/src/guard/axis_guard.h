@@ -13,7 +13,7 @@ namespace stepdriver::pulse {
 /// Why a motion must end.
 struct Objection {
   EndReason reason = EndReason::kDone;
-  LineFailure failure;  ///< for kLineError
+  LineFailure failure;  ///< only for kLineError
 };
 
 /// Whether the steps of an axis may go out, and whether its motion may end: by its switches, the
@@ -95,7 +95,7 @@ class AxisGuard {
   bool squares_ = false;  // the current motion does
   bool reserved_ = false;
   bool unchecked_ = false;
-  MotorSet faulty_ = 0;        // by the last readings of the fault lines
+  MotorSet faulty_ = 0;        // the motors with a fault, by the last readings of the fault lines
   MotorCounts square_lags_{};  // ChannelState::lags when it was square
   bool settling_ = false;
   Nanoseconds settling_since_ = 0;

@@ -98,7 +98,7 @@ std::vector<Recording::Pin> pinsOf(const std::vector<config::AxisConfig>& axes,
   return pins;
 }
 
-/// Of several failures, only the text matters here.
+/// How a request was answered, in words.
 std::string outcomeText(const activity::Reply& reply) {
   if (!reply.failure) return "accepted";
   const bool refused = reply.failure->kind == activity::Failure::Kind::kRefused;

@@ -48,7 +48,7 @@ class FlightRecorder {
     other_ring_.add(write.output, write.level, now);
   }
 
-  /// @name From the thread of the controller
+  /// @name Only for the controller's thread
   /// @{
   void addInput(const Input& input);
   /// @param before, after the snapshots before and after the turn.
@@ -60,7 +60,7 @@ class FlightRecorder {
   ///   once. Called here if there was a fault before.
   void onFault(std::function<void()> told);
 
-  /// From any thread.
+  /// Any thread may call it.
   Recording recording(pulse::Clock& clock) const;
 
  private:
@@ -85,7 +85,7 @@ class FlightRecorder {
   pulse::PinRing other_ring_;
   EventRing events_;
 
-  // Of the thread of the controller.
+  // Only the controller's thread uses these.
   EngineNews news_;
   pulse::Nanoseconds slipped_ = 0;
   std::map<std::uint64_t, int> jobs_;  // output of each write that a line writer makes

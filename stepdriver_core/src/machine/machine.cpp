@@ -35,13 +35,13 @@ namespace {
 constexpr double kLeastOverride = 0.01;
 constexpr double kMostOverride = 2.0;
 constexpr int kMostPreparations = 8;
-// Of an append: how far ahead the motion is changed at least, and how often that is tried before it
+// An append changes the motion at least this far ahead. That is tried this often before the motion
 // is changed only at its end.
 constexpr pulse::Nanoseconds kLeastLead = 20'000'000;
 constexpr int kMostExtensions = 5;
 // [s] How much of a path that was passed is kept: an order that the engine refuses takes it back.
 constexpr double kKept = 0.5;
-// [s] Of setpoints.
+// [s] The bounds of the timeout of setpoints.
 constexpr double kShortestTimeout = 0.005;
 constexpr double kLongestTimeout = 60.0;
 

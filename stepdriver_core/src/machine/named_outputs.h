@@ -62,11 +62,11 @@ class NamedOutput {
   int line_;
   bool wanted_;
   OutputState state_;
-  bool certain_ = true;                      // that the line has the level of that state
-  bool gave_up_ = false;                     // to write the safe state, until retry()
-  pulse::Nanoseconds on_since_ = 0;          // when the write that switched it on began
-  bool may_wait_ = false;                    // for its least times
-  std::optional<Job> job_;                   // being written
+  bool certain_ = true;              // whether the line has the level of that state for certain
+  bool gave_up_ = false;             // whether it gave up writing the safe state, until retry()
+  pulse::Nanoseconds on_since_ = 0;  // when the write that switched it on began
+  bool may_wait_ = false;            // whether it may wait for its least times
+  std::optional<Job> job_;           // being written
   std::vector<activity::SharedCall> calls_;  // wait until it is as wanted
   std::vector<activity::SharedCall>
       write_calls_;  // wait for the end of the next write, if there is one

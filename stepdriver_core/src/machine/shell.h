@@ -140,7 +140,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   std::condition_variable round_ended_;
   std::uint64_t rounds_ = 0;  // counts the rounds of the controller's thread
 
-  // To clients.
+  // Calls of clients, and their answers.
   mutable std::mutex answers_mutex_;
   std::condition_variable answered_;
   std::unordered_map<activity::CallId, Call> answers_;

@@ -13,7 +13,7 @@ Split split(DoubleDouble value) {
   const auto high = static_cast<std::int64_t>(std::nearbyint(value.hi));
   const double rest = (value.hi - static_cast<double>(high)) + value.lo;
   const double carry = std::nearbyint(rest);
-  // The remainder of value.hi without its integer is exact, so lo is not lost in it.
+  // The difference between value.hi and its integer is exact, so lo is not lost in it.
   return {high + static_cast<std::int64_t>(carry),
           ((value.hi - static_cast<double>(high)) - carry) + value.lo};
 }

@@ -19,7 +19,7 @@ struct DoubleDouble {
   constexpr DoubleDouble(double value) : hi(value) {}  // NOLINT: a double is one of these
   constexpr DoubleDouble(double high, double low) : hi(high), lo(low) {}
 
-  /// Rounded to a double.
+  /// The nearest double.
   double value() const { return hi + lo; }
 };
 
@@ -56,7 +56,7 @@ inline DoubleDouble normalized(double a, double b) {
   return {sum, b - (sum - a)};
 }
 
-/// Exact for every integer of 64 bits.
+/// It is exact for every integer of 64 bits.
 DoubleDouble fromInteger(std::int64_t value);
 
 inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
@@ -87,7 +87,7 @@ inline DoubleDouble operator*(DoubleDouble a, double b) {
   return normalized(product.hi, product.lo + a.lo * b);
 }
 
-/// Relative error below 2^-102.
+/// The relative error is below 2^-102.
 inline DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
   const double quotient = a.hi / b.hi;
   const DoubleDouble product = b * quotient;
@@ -95,7 +95,7 @@ inline DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
   return normalized(quotient, rest / b.hi);
 }
 
-/// Relative error below 2^-104.
+/// The relative error is below 2^-104.
 inline DoubleDouble operator/(DoubleDouble a, double b) {
   const double quotient = a.hi / b;
   const DoubleDouble product = exactProduct(quotient, b);
@@ -109,10 +109,10 @@ inline bool operator<(DoubleDouble a, DoubleDouble b) {
 
 inline DoubleDouble abs(DoubleDouble a) { return a.hi < 0.0 ? -a : a; }
 
-/// 0 of a negative number.
+/// The root of a negative number is 0.
 inline DoubleDouble sqrt(DoubleDouble a) {
   if (!(a.hi > 0.0)) return 0.0;
-  // One of Newton's steps from the double nearest to the root.
+  // Takes one step of Newton's method from the double that is nearest to the root.
   const double root = std::sqrt(a.hi);
   const DoubleDouble square = exactProduct(root, root);
   return normalized(root, (((a.hi - square.hi) - square.lo) + a.lo) / (2.0 * root));
@@ -120,7 +120,7 @@ inline DoubleDouble sqrt(DoubleDouble a) {
 
 inline DoubleDouble half(DoubleDouble a) { return {0.5 * a.hi, 0.5 * a.lo}; }
 
-/// @name The same for doubles, for templates of either type
+/// @name The same functions for doubles, so that templates work with either type
 /// @{
 inline double abs(double a) { return std::abs(a); }
 inline double sqrt(double a) { return a > 0.0 ? std::sqrt(a) : 0.0; }
@@ -149,7 +149,7 @@ constexpr DoubleDouble third<DoubleDouble>() {
   return {0x1.5555555555555p-2, 0x1.5555555555555p-56};
 }
 
-/// A number as the nearest integer and the remainder, at most a half.
+/// A number as the nearest integer and the remainder, which is at most a half.
 struct Split {
   std::int64_t whole = 0;
   double rest = 0.0;

@@ -8,13 +8,14 @@
 
 namespace stepdriver::motion {
 
-/// @file The roots of continuous functions that fall from above 0 at 0 to 0 or less at `high`.
+/// @file Finds the roots of continuous functions that fall from above 0 at 0 to 0 or less at
+///   `high`.
 ///
-/// Newton's method if the slope is known, otherwise Ridders' (C. J. F. Ridders, A new algorithm for
-/// computing a single root of a real continuous function, 1979). Neither leaves its bracket. Then
-/// secants in double-double.
+/// Newton's method is used if the slope is known, otherwise Ridders' (C. J. F. Ridders, A new
+/// algorithm for computing a single root of a real continuous function, 1979). Neither leaves its
+/// bracket. Secants in double-double then add the remaining bits.
 
-/// Where such a root lies.
+/// An interval that contains such a root.
 struct Bracket {
   double low = 0.0;
   double high = 0.0;
@@ -28,9 +29,9 @@ struct Bracket {
   }
 };
 
-/// A bracket whose ends have the root's order of magnitude, so that its halves have enough bits.
+/// A bracket whose ends have the root's order of magnitude, so that bisection reaches all bits.
 ///
-/// @param f double to double.
+/// @param f a function of a double that returns a double
 template <typename Function>
 Bracket bracketOf(const Function& f, double high) {
   Bracket bracket{0.0, high, 0.0, f(high)};
@@ -43,8 +44,8 @@ Bracket bracketOf(const Function& f, double high) {
   return bracket;
 }
 
-/// @param f double to double.
-/// @param noise f's rounding error: values this near to 0 are as good as 0.
+/// @param f a function of a double that returns a double
+/// @param noise the rounding error of f: values this near to 0 are as good as 0
 template <typename Function>
 double roughRootOf(const Function& f, Bracket bracket, double noise) {
   constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
@@ -65,17 +66,17 @@ double roughRootOf(const Function& f, Bracket bracket, double noise) {
 
 struct ExactRoot {
   DoubleDouble t;
-  DoubleDouble left;  ///< f there, apart from its rounding
+  DoubleDouble left;  ///< the value of f there, apart from its rounding
 };
 
-/// Relative: this near to a root the slope is that of the root.
+/// Relative to a root: this near to it, the slope is that of the root.
 constexpr double kNextTo = 1e-9;
 
 /// Corrects a root of `f` to more bits than a double has.
 ///
-/// @param f DoubleDouble to DoubleDouble.
-/// @param slope of f near the root, roughly.
-/// @param last values this near to 0 are corrected once more, without another value of f.
+/// @param f a function of a DoubleDouble that returns a DoubleDouble
+/// @param slope roughly the slope of f near the root
+/// @param last values this near to 0 are corrected once more, without another value of f
 template <typename Function>
 ExactRoot correctedRoot(const Function& f, DoubleDouble t, double slope, double last) {
   DoubleDouble f_t = f(t);
@@ -110,19 +111,19 @@ struct Value {
   double slope = 0.0;
 };
 
-/// A root, roughly, by Newton's method within the bracket.
+/// A root as Newton's method finds it within the bracket, roughly.
 struct RoughRoot {
   double t = 0.0;
   double slope = 0.0;  ///< the slope of f near there
 };
 
-/// @param f double to Value.
-/// @param noise f's rounding error: values this near to 0 are as good as 0.
+/// @param f a function of a double that returns a Value
+/// @param noise the rounding error of f: values this near to 0 are as good as 0
 template <typename Function>
 RoughRoot newtonRootOf(const Function& f, Bracket bracket, double noise) {
   constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
-  constexpr int kMost = 100;  // halvings
-  // As if f fell with the square of t.
+  constexpr int kMost = 100;  // after so many halvings, doubles are exhausted
+  // Estimates the root as if f fell with the square of t.
   double t = bracket.high * std::sqrt(bracket.f_low / (bracket.f_low - bracket.f_high));
   double slope = 0.0;
   for (int i = 0; i < kMost; ++i) {
@@ -143,20 +144,20 @@ RoughRoot newtonRootOf(const Function& f, Bracket bracket, double noise) {
 
 /// The root of a function near a rough one.
 ///
-/// @param f DoubleDouble to DoubleDouble.
-/// @param high end of the bracket.
+/// @param f a function of a DoubleDouble that returns a DoubleDouble
+/// @param high the end of the bracket
 template <typename Function>
 DoubleDouble rootNear(const Function& f, const RoughRoot& rough, double high) {
   constexpr double kLast = 1e-7;
-  constexpr double kWrong = 1e-9;  // the rough function has another root
+  constexpr double kWrong = 1e-9;  // beyond this, the rough function has another root
   const ExactRoot root = correctedRoot(f, rough.t, rough.slope, kLast);
   return std::abs(root.left.hi) > kWrong ? rootOf(f, high) : root.t;
 }
 
 /// The root of a function that is also known in doubles, which is faster.
 ///
-/// @param rough double to double, with this rounding error.
-/// @param exact DoubleDouble to DoubleDouble.
+/// @param rough the function from double to double, with this rounding error
+/// @param exact the function from DoubleDouble to DoubleDouble
 template <typename Rough, typename Exact>
 DoubleDouble rootOf(const Rough& rough, const Exact& exact, const Bracket& bracket, double noise) {
   const double t = roughRootOf(rough, bracket, noise);

@@ -15,54 +15,56 @@
 namespace stepdriver::motion {
 namespace {
 
-// Of an acceleration: rounded times and positions change it by no more. The times of both ends of a
-// cubic of the duration h are rounded by e each, which changes its acceleration a by 6 a e/h, and a
-// position that is rounded by r changes it by 6 r/h^2: knots aren't closer than that allows.
+// The largest part of an acceleration by which rounded times and positions change it. The times of
+// both ends of a cubic of the duration h are rounded by e each, which changes its acceleration a by
+// 6 a e/h, and a position that is rounded by r changes it by 6 r/h^2: knots aren't closer than that
+// allows.
 constexpr double kMostRounding = 1.5e-4;
-// The same if the axes would move by more than a microstep in such a time.
+// The same part if the axes would move by more than a microstep between such knots.
 constexpr double kMostRoundingOfFast = 5e-3;
-// What exceeds a limit after so many plans slows the whole motion down; one that begins at a speed
-// can't be slowed down.
+// After this many plans, the whole motion is slowed down if it still exceeds a limit. A motion that
+// begins at a speed can't be slowed down.
 constexpr int kMostPlans = 6;
 constexpr int kMostPlansFromSpeed = 12;
-// Of a limit: less is left for the whole motion to be slowed down by.
+// As a part of a limit: a smaller excess is left for slowing the whole motion down.
 constexpr double kSmallExcess = 1e-3;
 // Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
 // right, makes fewer plans.
 constexpr double kLowerBy = 1.002;
 
-// An interval is divided if it isn't at a limit to this part, unless it takes less than a small
-// part of its segment's time.
+// An interval is divided if it uses no limit to this part, unless it takes less than a small part
+// of its segment's time.
 constexpr double kFullUse = 0.92;
 constexpr double kMostSquareRatio = 1.5;
 constexpr double kSmallPart = 0.005;
-// If both ends of an interval are checked, and that lowers the speed by so much, it is divided,
-// unless it is too short even for that.
+// If both ends of an interval are checked, and that lowers the speed by this factor, the interval
+// is divided, unless it is too short even for that.
 constexpr double kMostLoss = 1.02;
 constexpr double kSmallestPart = 1e-4;
-// Of a limit: if a cubic exceeds it by so much, both ends of its interval are checked, and it is
-// divided if that is still possible.
+// If a cubic exceeds a limit by this factor, both ends of its interval are checked, and the
+// interval is divided if that is still possible.
 constexpr double kPoorCubic = 1.01;
-// Of the duration of an interval with constant acceleration along it.
+// By how much an interval may take longer or shorter than with a constant acceleration along it, as
+// a part of its duration.
 constexpr double kMostStretch = 0.1;
-constexpr double kMostDeviation = 0.02;  // of the resolution
-constexpr double kMostLeftOut = 0.01;    // of the resolution
+constexpr double kMostDeviation = 0.02;  // relative to the resolution
+constexpr double kMostLeftOut = 0.01;    // relative to the resolution
 constexpr int kMostDivisions = 4;
 constexpr std::size_t kPartsOfDivided = 2;
 
-// A straight part, from a speed to another one, and what lies between.
+// The motion on a straight part, from one speed to another: two ramps with a cruise between them.
 struct Trapezoid {
-  double ramp_up = 0.0;  // s
-  double way_up = 0.0;   // unit
-  double cruise = 0.0;   // s
+  double ramp_up = 0.0;  // [s]
+  double way_up = 0.0;   // [unit]
+  double cruise = 0.0;   // [s]
   double way_cruise = 0.0;
-  double ramp_down = 0.0;  // s
-  double peak = 0.0;       // unit/s
+  double ramp_down = 0.0;  // [s]
+  double peak = 0.0;       // [unit/s]
 
   double duration() const { return ramp_up + cruise + ramp_down; }
 };
 
-// @param shortest [s] shorter ramps become so long if there is room for that.
+// @param shortest [s] shorter ramps are lengthened to this if there is room for that.
 Trapezoid trapezoidOf(double length, double begin_square, double end_square,
                       const Reachability::Ramp& ramp, double peak_square, double shortest) {
   Trapezoid made;
@@ -73,7 +75,7 @@ Trapezoid trapezoidOf(double length, double begin_square, double end_square,
   const double way_down = (peak_square - end_square) / (2.0 * ramp.down);
   made.way_cruise = std::max(0.0, length - made.way_up - way_down);
   made.cruise = made.way_cruise / made.peak;
-  // From a speed that is too high for the ramp, it has to slow down more steeply.
+  // If the speed is too high for the ramp, the motion has to slow down more steeply.
   const double way_left = length - made.way_up;
   if (way_down > way_left) made.ramp_down = 2.0 * way_left / (made.peak + std::sqrt(end_square));
   const auto longer = [&](double time) { return time > 0.0 ? std::max(time, shortest) : 0.0; };
@@ -89,7 +91,7 @@ Trapezoid trapezoidOf(double length, double begin_square, double end_square,
   return made;
 }
 
-// The share of their limits that a cubic uses: the largest of all axes.
+// The largest shares of their limits that the axes use on a cubic.
 struct CubicUsage {
   double acceleration_at_begin = 0.0;
   double acceleration_at_end = 0.0;
@@ -98,8 +100,8 @@ struct CubicUsage {
   double acceleration() const { return std::max(acceleration_at_begin, acceleration_at_end); }
 };
 
-// The motion at a planned speed: the durations of the intervals, and its knots. What follows from
-// the speeds at both ends of an interval is kept until they change.
+// The motion at a planned speed: the durations of the intervals, and its knots. Values that follow
+// from the speeds at both ends of an interval are kept until these speeds change.
 class Knots {
  public:
   Knots(const PathGrid& grid, const std::vector<TimingLimits>& limits, double resolution)
@@ -108,7 +110,7 @@ class Knots {
     kept_.resize(grid.size());
   }
 
-  /// After PathGrid::divideEach().
+  /// Follows a division of the grid by PathGrid::divideEach().
   void regrid(const Division& division) {
     division.spread(kept_);
     for (std::size_t i = 0; i < division.intervals.size(); ++i) {
@@ -137,7 +139,7 @@ class Knots {
     findClosest();
     knots_.clear();
     inner_.clear();
-    // A straight part may have two more.
+    // A straight part may have two more knots.
     knots_.reserve(2 * grid_.size());
     appendPlace(0, 0.0, kept_[0].begin, 0);
     double time = 0.0;
@@ -155,7 +157,7 @@ class Knots {
   /// Whether settle() has been called since the speeds of an interval changed.
   bool isSettled(std::size_t interval) const { return kept_[interval].settled; }
   void settle(std::size_t interval) { kept_[interval].settled = true; }
-  /// Of the cubic of an interval that isn't straight.
+  /// How much the cubic of an interval that isn't straight uses of the limits.
   const CubicUsage& usageOf(std::size_t interval) {
     Kept& kept = kept_[interval];
     if (!kept.usage) {
@@ -182,14 +184,14 @@ class Knots {
   }
   double parameter(std::size_t knot) const { return knots_[knot].parameter; }
   double speed(std::size_t knot) const { return knots_[knot].speed; }
-  /// Whether it is a place of the path, or on a straight part of it.
+  /// Whether a knot is a place of the path, or on a straight part of it.
   bool isOnPath(std::size_t knot) const { return knots_[knot].inner == kNone; }
-  /// The first interval that contains the way from a knot to the next one.
+  /// The first interval that contains a part of the way from a knot to the next one.
   std::size_t intervalAfter(std::size_t knot) const {
     const Knot& of = knots_[knot];
     return of.place == kNone || of.place == 0 ? of.interval : of.interval + 1;
   }
-  /// On the way from the knot before it.
+  /// Whether the way from the knot before it to a knot is straight.
   bool isStraight(std::size_t knot) const {
     if (knots_[knot].skipped) return false;
     const std::size_t last = interval(knot);
@@ -197,7 +199,7 @@ class Knots {
     const bool whole = first + 1 == last && parameter(knot - 1) == grid_[first].to;
     return grid_[last].straight && (first == last || whole);
   }
-  /// [s] Of the last knot that isn't after a place.
+  /// [s] The time of the last knot that isn't after a place.
   double timeAt(std::size_t place) const {
     const auto later = std::lower_bound(
         knots_.begin() + 1, knots_.end(), place,
@@ -205,7 +207,7 @@ class Knots {
     return (later - 1)->time;
   }
 
-  /// Of the cubic that ends at a knot.
+  /// How much the cubic that ends at a knot uses of the limits.
   CubicUsage usageBefore(std::size_t knot) {
     const std::size_t place = knots_[knot].place;
     const bool whole = place != kNone && knots_[knot - 1].place + 1 == place;
@@ -224,26 +226,26 @@ class Knots {
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   static constexpr double kForever = std::numeric_limits<double>::infinity();
 
-  // Of an interval.
+  // What is known about an interval.
   struct Kept {
-    double begin_square = -1.0;  // unit^2/s^2
+    double begin_square = -1.0;  // [unit^2/s^2]
     double end_square = -1.0;
-    double begin = 0.0;  // unit/s
+    double begin = 0.0;  // [unit/s]
     double end = 0.0;
-    double duration = 0.0;  // s
+    double duration = 0.0;  // [s]
     std::optional<CubicUsage> usage = {};
     bool settled = false;
   };
   struct Knot {
     double time;
-    std::size_t interval;  // of the grid, which ends at the knot or contains it
-    std::size_t place;     // or kNone, within an interval
-    double way;            // unit, from the begin of a straight part
+    std::size_t interval;  // the interval of the grid that ends at the knot or contains it
+    std::size_t place;     // kNone within an interval
+    double way;            // [unit] from the begin of a straight part
     double parameter;
     double speed;
-    bool rests = false;         // at a place
-    std::size_t inner = kNone;  // first of its states, within an interval that isn't straight
-    bool skipped = false;       // whether others were left out between the one before and it
+    bool rests = false;         // the motion rests there, at a place
+    std::size_t inner = kNone;  // the first of its states, within an interval that isn't straight
+    bool skipped = false;       // whether knots were left out between the knot before and this one
   };
   struct Joint {
     double position;
@@ -269,7 +271,8 @@ class Knots {
       usage.acceleration_at_end = std::max(usage.acceleration_at_end, part(end));
       double speed = std::max(std::abs(v0), std::abs(v1));
       if (begin * end < 0.0) {
-        const double turn = begin / (begin - end);  // of the acceleration, in parts of the duration
+        // The time at which the acceleration changes its sign, as a part of the duration.
+        const double turn = begin / (begin - end);
         speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
       }
       usage.speed = std::max(usage.speed, speed / limits_[j].speed);
@@ -277,10 +280,11 @@ class Knots {
     return usage;
   }
 
-  // [s] The duration closest to T = 2 length/(begin + end), that of a constant s'', for which the
-  // accelerations at both ends of the cubic keep to their limits. For T (1 + e), they are
-  // a - 6 e way/T^2 at the begin and b + 6 e way/T^2 at the end, but for e^2. If there is none, the
-  // excess is the same at both limits.
+  // [s] The duration with which the accelerations at both ends of the cubic keep to their limits.
+  // It is the one closest to T = 2 length/(begin + end), the duration with a constant s''. With the
+  // duration T (1 + e), the accelerations are a - 6 e way/T^2 at the begin and b + 6 e way/T^2 at
+  // the end, except for terms of e^2. If there is no such duration, the excess is the same at both
+  // limits.
   double durationOf(std::size_t interval, double begin, double end) const {
     const double even = 2.0 * grid_[interval].length / (begin + end);
     const double rate = 1.0 / even;
@@ -308,7 +312,7 @@ class Knots {
   }
 
   Trapezoid trapezoid(std::size_t interval, const Reachability& speed) const {
-    constexpr double kRounding = 1.001;  // for differences of times
+    constexpr double kRounding = 1.001;  // allows for the rounding of differences of times
     return trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
                        speed.ramp(interval), speed.peakSquare(interval), kRounding * closest_);
   }
@@ -363,7 +367,7 @@ class Knots {
     skips_ = false;
   }
 
-  // @pre it is too close to the last knot.
+  // @pre the knot is too close to the last one.
   void appendRest(const Knot& rest) {
     if (knots_.size() > 1 && !knots_.back().rests) {
       const Knot close = knots_.back();
@@ -380,8 +384,8 @@ class Knots {
   }
 
   // Whether the cubic between two knots is off by more than a small part of the resolution because
-  // one between them is left out. If it is off by dp and dv there, it is off by up to
-  // dp + 4/27 h dv in the time h before or after that.
+  // a knot between them is left out. If the cubic is off by dp and dv there, it is off by up to dp
+  // + 4/27 h dv in the time h before or after that.
   bool matters(const Knot& from, const Knot& left_out, const Knot& to) const {
     const double longest = std::max(left_out.time - from.time, to.time - left_out.time);
     for (std::size_t j = 0; j < axes_; ++j) {
@@ -394,7 +398,7 @@ class Knots {
     return false;
   }
 
-  // On the cubic between two knots.
+  // The state of an axis on the cubic between two knots.
   Joint cubicAt(const Knot& from, const Knot& to, double time, std::size_t axis) const {
     const double whole = to.time - from.time;
     const double passed = time - from.time;
@@ -407,7 +411,7 @@ class Knots {
             begin.velocity + passed * (a + passed * jerk / 2.0)};
   }
 
-  // The state at a time between two knots with no other one between them.
+  // The state at a time between two neighbouring knots.
   Knot within(const Knot& from, const Knot& to, double time) {
     const double whole = to.time - from.time;
     const double passed = time - from.time;
@@ -436,7 +440,7 @@ class Knots {
     return {grid_.position(knot.place)[axis], direction[axis] * knot.speed};
   }
 
-  // [s] See kMostRounding.
+  // Finds how close knots may be, see kMostRounding.
   void findClosest() {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     double duration = 0.0;
@@ -462,17 +466,17 @@ class Knots {
 
   const PathGrid& grid_;
   const std::vector<TimingLimits>& limits_;
-  double resolution_;  // [unit] of the path
+  double resolution_;  // [unit] the path's resolution
   std::size_t axes_;
-  std::vector<Kept> kept_;  // of each interval
+  std::vector<Kept> kept_;  // for each interval
   std::vector<Knot> knots_;
-  std::vector<Joint> inner_;  // of each axis, of some of them
-  double closest_ = 0.0;      // [s] knots, but for two at rest
+  std::vector<Joint> inner_;  // for each axis, at some of the knots
+  double closest_ = 0.0;      // [s] the least time between knots, except between two at rest
   bool skips_ = false;        // whether knots were left out after the last one
-  Knot seen_{};               // the last one, even if it was left out
+  Knot seen_{};               // the last knot, even if it was left out
 };
 
-// By what factor limits are exceeded; 1 if they aren't.
+// The factors by which limits are exceeded; 1 if they aren't.
 struct Excess {
   double acceleration = 1.0;
   double speed = 1.0;
@@ -528,7 +532,8 @@ double middleDeviation(const PathGrid& grid, std::size_t interval, double begin,
   return std::sqrt(std::max(0.0, off_square - along * along / rate_square));
 }
 
-// Whether an interval wastes time, unless it takes only a small part of its segment's, or deviates.
+// Whether an interval deviates or wastes time. An interval that takes only a small part of its
+// segment's time doesn't count as wasteful.
 bool isLong(std::size_t interval, double part, double deviation, const PathGrid& grid,
             Reachability& speed, Knots& knots) {
   if (part >= kSmallestPart && speed.lossOfBothEnds(interval) > kMostLoss) return true;
@@ -542,7 +547,8 @@ bool isLong(std::size_t interval, double part, double deviation, const PathGrid&
 // Divides the intervals that are too long, and those whose cubics are poor.
 bool divideLong(double deviation, PathGrid& grid, Reachability& speed, Knots& knots) {
   std::vector<bool> divided(grid.size(), false);
-  std::vector<double> times(grid[grid.size() - 1].segment + 1, 0.0);  // of the segments
+  // The durations of the segments.
+  std::vector<double> times(grid[grid.size() - 1].segment + 1, 0.0);
   for (std::size_t i = 0; i < grid.size(); ++i) times[grid[i].segment] += knots.duration(i);
   bool any = false;
   for (std::size_t i = 0; i < grid.size(); ++i) {
@@ -616,12 +622,12 @@ std::vector<TimingKnot> slowedDown(const Knots& knots, const PathGrid& grid, dou
   return made;
 }
 
-// The largest part of a limit that the motion uses if that is more than 1, and the factor by which
-// it has to be slowed down as a whole for that.
+// The result of planning: the largest part of a limit that the motion uses if that is more than 1,
+// and the factor by which the whole motion has to be slowed down for that.
 struct Outcome {
   double excess = 1.0;
   double slowdown = 1.0;
-  double settled = 0.0;  // [s] see PathTiming, of the motion that isn't slowed down
+  double settled = 0.0;  // [s] see PathTiming; for the motion before it is slowed down
 };
 
 Outcome planKnots(const Path& path, const std::vector<TimingLimits>& limits, double begin_speed,
@@ -632,7 +638,7 @@ Outcome planKnots(const Path& path, const std::vector<TimingLimits>& limits, dou
     knots.findDurations(speed);
     if (!divideLong(kMostDeviation * path.resolution(), grid, speed, knots)) break;
   }
-  // From a speed, what still exceeds the limits isn't slowed down afterwards.
+  // A motion from a speed isn't slowed down afterwards if it still exceeds the limits.
   const bool from_speed = begin_speed > 0.0;
   const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
   for (int plans = 1;; ++plans) {
@@ -659,7 +665,7 @@ PathTiming planAccelerationLimited(const Path& path, const std::vector<TimingLim
   PathTiming plan;
   if (begin.speed > 0.0) {
     plan.excess = outcome.excess;
-    // From a speed that is much too high, it may come to rest anywhere, and never end.
+    // From a speed that is much too high, the motion might come to rest anywhere, and never end.
     if (plan.excess > kPoorCubic) return plan;
   }
   plan.settled_ns = std::llround(outcome.settled * outcome.slowdown * 1e9);

@@ -9,7 +9,8 @@
 
 namespace stepdriver::motion {
 
-/// The limits of one axis on a path, all above 0 and finite but for the jerk [unit/s, unit/s^2].
+/// The limits of one axis on a path. All are above 0, and all but the jerk are finite [unit/s,
+/// unit/s^2].
 struct TimingLimits {
   double speed = 0.0;
   double acceleration = 0.0;                              ///< while its speed rises
@@ -25,21 +26,21 @@ struct TimingKnot {
   std::vector<double> velocities;  ///< [unit/s]
   /// [unit/s^2] Empty if accelerations may jump.
   std::vector<double> accelerations;
-  double parameter = 0.0;     ///< of the segment
+  double parameter = 0.0;     ///< the parameter of the segment there
   double speed = 0.0;         ///< [unit/s] along the path
   double acceleration = 0.0;  ///< [unit/s^2] along the path; 0 if accelerations may jump
   /// Another path can begin here: no corner before it is being rounded, or if accelerations may
   /// not jump, the state of the motion here allows all that has been planned for the time after it.
   bool may_begin = false;
   double average = 0.0;  ///< [s] the time over which planJerkLimited() averaged
-  /// On the way to the next knot, the segment of that one is straight, and the acceleration
+  /// On the way to the next knot, that knot's segment is straight, and the acceleration is
   /// constant.
   bool straight = false;
 };
 
 /// The place and the speed at which a motion along a path begins.
 struct TimingStart {
-  double parameter = 0.0;  ///< of the first segment
+  double parameter = 0.0;  ///< the parameter of the first segment there
   double speed = 0.0;      ///< [unit/s] along the path
   /// @name Ignored if accelerations may jump
   /// @{
@@ -52,11 +53,11 @@ struct TimingStart {
 
 /// The motion along a path.
 struct PathTiming {
-  std::vector<TimingKnot> knots;  ///< the first one at time 0 and at the begin
+  std::vector<TimingKnot> knots;  ///< the first one is at time 0 and at the begin of the path
   /// Up to this time the motion is also the fastest one if the path continues at its end,
   /// however its corner there is rounded.
   std::int64_t settled_ns = 0;
-  /// The segments at whose end it stops instead of rounding the corner, which would take longer: in
+  /// The segments at whose end the motion stops because rounding the corner would take longer, in
   /// increasing order.
   std::vector<std::size_t> stops;
   /// The largest part of a limit that the motion uses if that is more than 1: if it begins at a

@@ -81,9 +81,9 @@ class QuinticUsage {
   double jerk(double u) const {
     return (6.0 * c3_ + u * (24.0 * c4_ + u * 60.0 * c5_)) / (h_ * h_ * h_);
   }
-  // In increasing order; NaN if there is none.
+  // The roots in increasing order; NaN if there is none.
   std::array<double, 2> rootsOfJerk() const {
-    // 10 c5 u^2 + 4 c4 u + c3 = 0
+    // Solves 10 c5 u^2 + 4 c4 u + c3 = 0.
     const double root = std::sqrt(4.0 * c4_ * c4_ - 10.0 * c5_ * c3_);
     const double sum = -(2.0 * c4_ + std::copysign(root, c4_));
     const double a = sum / (10.0 * c5_);

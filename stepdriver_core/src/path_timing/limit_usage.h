@@ -20,7 +20,7 @@ struct LimitUsage {
     jerk = std::max(jerk, other.jerk);
   }
   double most() const { return std::max({speed, acceleration, jerk}); }
-  /// How much slower the motion has to be.
+  /// The factor by which the motion has to be slower.
   double slowdown() const { return std::max({speed, std::sqrt(acceleration), std::cbrt(jerk)}); }
 };
 

@@ -11,8 +11,9 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-constexpr double kNegligible = 1e-12;  // of a derivative with respect to the length, which is 1
-constexpr int kMostSteps = 100;        // of the search for the largest x
+// Compared with 1, the derivative of the position along a path with respect to the length.
+constexpr double kNegligible = 1e-12;
+constexpr int kMostSteps = 100;  // the steps of the search for the largest x
 
 }  // namespace
 
@@ -20,7 +21,7 @@ Reachability::Reachability(const Path& path, const PathGrid& grid,
                            const std::vector<TimingLimits>& limits, double begin,
                            CheckedAcceleration checked)
     : path_(path), grid_(grid), limits_(limits) {
-  // With room for all that the grid has room for.
+  // Reserves room for as many intervals as the grid can have.
   const auto fill = [&](auto& values, std::size_t more, auto value) {
     values.reserve(grid.capacity() + more);
     values.assign(grid.size() + more, value);
@@ -98,7 +99,7 @@ void Reachability::regrid(const Division& division) {
 void Reachability::plan() {
   const std::size_t size = grid_.size();
   if (stale_.back()) findAllowed(size - 1);
-  bool changed = false;  // what is controllable at the end of the interval
+  bool changed = false;  // whether the controllable x at the end of the interval has changed
   for (std::size_t i = size; i-- > 0;) {
     giveWayAt(i);
     const bool stale = stale_[i] != 0;
@@ -106,12 +107,12 @@ void Reachability::plan() {
     if (stale_before) findAllowed(i - 1);
     // The speeds of an interval also limit x at its end.
     if (!stale && !changed && !stale_before) continue;
-    stale_[i] = stale || changed;  // for the second pass
+    stale_[i] = stale || changed;  // the second pass plans it again
     const double x = grid_.stopsAt(i) ? 0.0 : largestBefore(i, controllable_[i + 1]);
     changed = x != controllable_[i];
     controllable_[i] = x;
   }
-  bool moved = false;  // x at the begin of the interval
+  bool moved = false;  // whether x at the begin of the interval has changed
   for (std::size_t i = 0; i < size; ++i) {
     giveWayAt(i);
     if (!moved && stale_[i] == 0) continue;
@@ -123,7 +124,7 @@ void Reachability::plan() {
 }
 
 std::size_t Reachability::settledUntil(std::size_t open) {
-  constexpr double kRoundable = 0.5;  // of a segment
+  constexpr double kRoundable = 0.5;  // the parameter up to which a rounding may begin
   double fast = capAtEnd(grid_.size() - 1);
   double slow = 0.0;
   for (std::size_t i = grid_.size(); i-- > 0;) {
@@ -159,7 +160,7 @@ double Reachability::capAt(std::size_t interval, const double* first) const {
   return sum > 0.0 ? std::min(cap, speed * speed / sum) : cap;
 }
 
-// The speeds on both sides of a place; before an interval.
+// The largest x that the speeds on both sides of a place allow, which is before an interval.
 double Reachability::capBefore(std::size_t place) const {
   const double after = allowed_[place].cap_at_begin;
   return place == 0 ? after : std::min(after, allowed_[place - 1].cap_at_end);
@@ -195,9 +196,9 @@ double Reachability::peakSquare(std::size_t interval) const {
   return std::max({std::min(meeting, allowed_[interval].cap_at_begin), begin, end});
 }
 
-// What the accelerations of the axes in an interval allow, with x and u at its begin: at its end x
-// is x + 2 length u = e^2. With b^2 = x, the mean of an acceleration is
-// (q1' e - q0' b) (b + e)/(2 length), and b e is (b^2 + e^2)/2 but for (e - b)^2/2.
+// Collects what the accelerations of the axes in an interval allow. At its begin, the motion has x
+// and u; at its end, x is x + 2 length u = e^2. With b^2 = x, the mean of an acceleration is (q1' e
+// - q0' b) (b + e)/(2 length), and b e is (b^2 + e^2)/2 except for (e - b)^2/2.
 void Reachability::collectBands(std::size_t interval, Allowed& allowed) {
   allowed.most_x = kUnbounded;
   const bool mean = checked_[interval] == CheckedAcceleration::kMean;
@@ -209,7 +210,7 @@ void Reachability::collectBands(std::size_t interval, Allowed& allowed) {
     bands_.resize(bands_.size() + needed);
   }
   Band* next = &bands_[allowed.first_band];
-  // least <= u_factor u + x_factor x <= most
+  // Adds the band least <= u_factor u + x_factor x <= most.
   const auto add = [&](double u_factor, double x_factor, double least, double most) {
     if (std::abs(u_factor) < kNegligible) {
       if (x_factor > 0.0) allowed.most_x = std::min(allowed.most_x, most / x_factor);
@@ -241,7 +242,7 @@ void Reachability::collectBands(std::size_t interval, Allowed& allowed) {
   allowed.bands = static_cast<std::size_t>(next - &bands_[allowed.first_band]);
 }
 
-// If x at the end of the interval is from 0 to `end`.
+// The tightest bounds of u at an x, if x at the end of the interval is to be from 0 to `end`.
 Reachability::Range Reachability::tightestAt(std::size_t interval, double end, double x) const {
   const double twice = 2.0 * grid_[interval].length;
   Bound low{0.0, -1.0 / twice};
@@ -281,7 +282,7 @@ double Reachability::largestBefore(std::size_t interval, double end) const {
     const auto [low, high] = tightestAt(interval, end, x);
     if (high.at(x) >= low.at(x)) break;
     const double meet = (high.offset - low.offset) / (low.slope - high.slope);
-    if (!(meet < x)) break;  // rounding
+    if (!(meet < x)) break;  // only rounding is left
     x = std::max(meet, 0.0);
   }
   return x;
@@ -290,7 +291,7 @@ double Reachability::largestBefore(std::size_t interval, double end) const {
 double Reachability::largestAfter(std::size_t interval, double begin, double end) const {
   const double twice = 2.0 * grid_[interval].length;
   if (grid_[interval].straight) return std::min(end, begin + twice * ramp(interval).up);
-  double most = end / twice + (-1.0 / twice) * begin;  // of u
+  double most = end / twice + (-1.0 / twice) * begin;  // the largest u
   const Allowed& allowed = allowed_[interval];
   for (std::size_t k = 0; k < allowed.bands; ++k) {
     const Band& band = bands_[allowed.first_band + k];

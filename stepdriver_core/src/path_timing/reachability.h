@@ -13,7 +13,7 @@
 
 namespace stepdriver::motion {
 
-/// What keeps to the accelerations of the axes in an interval that isn't straight.
+/// The accelerations that keep to the limits of the axes in an interval that isn't straight.
 enum class CheckedAcceleration {
   kMean,
   kAtBothEnds,  ///< with a constant s''
@@ -28,8 +28,7 @@ class Reachability {
   Reachability(const Path& path, const PathGrid& grid, const std::vector<TimingLimits>& limits,
                double begin = 0.0, CheckedAcceleration checked = CheckedAcceleration::kAtBothEnds);
 
-  /// Lowers the limits of an interval for the next plan(): divides accelerations and speeds by
-  /// these.
+  /// Lowers the limits of an interval for the next plan() by dividing its accelerations and speeds.
   void lower(std::size_t interval, double acceleration, double speed);
   /// Limits the square of the speed in an interval [unit^2/s^2], and the acceleration along it
   /// [unit/s^2], for the next plan().
@@ -38,15 +37,16 @@ class Reachability {
   ///
   /// @return whether that is new.
   bool checkBothEnds(std::size_t interval);
-  /// By what factor the square of the speed before an interval would be higher if only the mean of
-  /// its accelerations counted; 1 if it is lower anyway. Call it after plan().
+  /// The factor by which the square of the speed before an interval would be higher if only the
+  /// mean of its accelerations counted; 1 if it is lower anyway. Call it after plan().
   double lossOfBothEnds(std::size_t interval);
-  /// After PathGrid::divideEach().
+  /// Follows a division of the grid by PathGrid::divideEach().
   void regrid(const Division& division);
   /// Plans everything the first time, then only what has changed since.
   void plan();
 
-  /// [unit^2/s^2] The highest that the speeds alone allow before an interval and at its end.
+  /// [unit^2/s^2] The highest square of the speed that the speeds alone allow at the begin and at
+  /// the end of an interval.
   double capAtBegin(std::size_t interval) const {
     return stale_[interval] ? capAt(interval, grid_.firstAtBegin(interval))
                             : allowed_[interval].cap_at_begin;
@@ -56,15 +56,16 @@ class Reachability {
                             : allowed_[interval].cap_at_end;
   }
 
-  /// [unit^2/s^2] @param place from 0 to the size of the grid.
+  /// [unit^2/s^2] The square of the speed at a place, from 0 to the size of the grid.
   double square(std::size_t place) const { return squares_[place]; }
-  /// [unit^2/s^2] The highest from which the motion can still slow down for everything ahead.
+  /// [unit^2/s^2] The highest square of the speed from which the motion can still slow down for
+  /// everything ahead.
   double controllable(std::size_t place) const { return controllable_[place]; }
-  /// A place up to which the plan stays the same if the path continues at its end, whether it
-  /// needn't slow down there or must be at rest half a segment before it, at the first place at
-  /// which the rounding of a corner may begin. Call it after plan().
+  /// A place up to which the plan stays the same if the path continues at its end: whether the
+  /// motion needn't slow down there, or must be at rest half a segment before it, at the first
+  /// place at which the rounding of a corner may begin. Call it after plan().
   ///
-  /// @param open from this place on, its speed may be higher then.
+  /// @param open from this place on, the speed may be higher then.
   std::size_t settledUntil(std::size_t open = std::numeric_limits<std::size_t>::max());
 
   /// The accelerations along a straight interval that the axes allow [unit/s^2].
@@ -83,7 +84,7 @@ class Reachability {
     double slope = 0.0;
     double at(double x) const { return offset + slope * x; }
   };
-  // u is from least + slope x to most + slope x.
+  // u lies between least + slope x and most + slope x.
   struct Band {
     double least = 0.0;
     double most = 0.0;
@@ -91,15 +92,15 @@ class Reachability {
   };
   // What the limits allow in an interval: a ramp if it is straight, or else bands.
   struct Allowed {
-    double cap_at_begin = 0.0;  // of x
+    double cap_at_begin = 0.0;  // the highest x there
     double cap_at_end = 0.0;
     Ramp ramp;
     double most_x = 0.0;
     std::size_t first_band = 0;
     std::size_t bands = 0;
-    std::size_t most_bands = 0;  // that have room from first_band on
+    std::size_t most_bands = 0;  // the number of bands that have room from first_band on
   };
-  // The lowest and the highest u at an x.
+  // Bounds of the lowest and the highest u at an x.
   struct Range {
     Bound low;
     Bound high;
@@ -116,20 +117,21 @@ class Reachability {
   const Path& path_;
   const PathGrid& grid_;
   const std::vector<TimingLimits>& limits_;
-  std::vector<double> acceleration_shares_;  // of each interval
+  std::vector<double> acceleration_shares_;  // for each interval
   std::vector<double> speed_shares_;
   std::vector<double> most_squares_;
   std::vector<double> most_accelerations_;
   std::vector<CheckedAcceleration> checked_;
   std::vector<char> stale_;  // whether each interval has changed since the last plan
   std::vector<Allowed> allowed_;
-  std::vector<Band> bands_;           // of the intervals
-  std::vector<double> controllable_;  // the largest x at each place from which it can slow down
-  std::vector<double> squares_;       // x at each place
+  std::vector<Band> bands_;  // those of all intervals
+  // The largest x at each place from which the motion can slow down.
+  std::vector<double> controllable_;
+  std::vector<double> squares_;  // x at each place
 };
 
-/// The sign of the motion of an axis in an interval that begins and ends with these velocities; 0:
-/// it turns, or doesn't move.
+/// The sign of the motion of an axis in an interval with these velocities at its ends; 0: it turns,
+/// or doesn't move.
 inline int directionOf(double begin, double end) {
   const double rounding = 1e-9 * std::max(std::abs(begin), std::abs(end));
   if (begin > rounding || end > rounding) return begin < -rounding || end < -rounding ? 0 : 1;

@@ -18,7 +18,7 @@ constexpr double kJerkRounding = 1e-9;
 double jerkToRampDown(const MotionState& from, const MotionLimits& limits) {
   const double speed = std::abs(from.velocity);
   const bool slows_down = from.velocity * from.acceleration < 0.0;
-  if (slows_down && speed <= limits.start_speed) return 0.0;  // it can stop at once
+  if (slows_down && speed <= limits.start_speed) return 0.0;  // the axis can stop at once
   const double room = slows_down ? speed - limits.start_speed : limits.max_speed - speed;
   if (room <= 0.0) return std::numeric_limits<double>::infinity();
   return from.acceleration * from.acceleration / (2.0 * room);

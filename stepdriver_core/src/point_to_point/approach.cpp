@@ -23,15 +23,16 @@ DoubleDouble stoppingLength(DoubleDouble v, DoubleDouble a, const MotionLimits& 
 
 // The fastest stop under a jerk limit, in doubles and as a formula.
 struct RoughStop {
-  double length = 0.0;   // microsteps, signed
-  double farther = 0.0;  // microsteps/s: how much farther it ends if the motion continues first
-  bool applies = true;   // otherwise the stop has another form
+  double length = 0.0;  // [microsteps] signed
+  // [microsteps/s] How much farther it ends for each second that the motion continues first.
+  double farther = 0.0;
+  bool applies = true;  // false: the stop has another form
 };
 
-// In the direction of the stop: it is the stop from the speed w = v + a^2/(2 J) without
-// acceleration, begun a/J earlier, or later if the motion already slows down. From w it takes the
-// distance w/2 (w/d + d/J), or w sqrt(w/J) if the deceleration doesn't reach d. With a start speed,
-// the ramp ends there.
+// All values are seen in the direction of the stop. It is the stop from the speed w = v + a^2/(2 J)
+// without acceleration that begins a/J earlier, or later if the motion already slows down. From w
+// it takes the distance w/2 (w/d + d/J), or w sqrt(w/J) if the deceleration doesn't reach d. With a
+// start speed, the ramp ends at that speed.
 RoughStop roughStop(double v, double a, double j, const MotionLimits& limits) {
   const double start = startSpeed(limits);
   const double level = v + a * std::abs(a) / (2.0 * limits.jerk);
@@ -58,7 +59,7 @@ RoughStop roughStop(double v, double a, double j, const MotionLimits& limits) {
 // The moment at which a motion leaves the change to the maximum speed to stop.
 struct Switch {
   std::size_t phase = 0;
-  DoubleDouble time;  // s from the beginning of the phase
+  DoubleDouble time;  // [s] from the beginning of the phase
 };
 
 std::optional<Switch> switchWithJerk(const Phases& phases, DoubleDouble length,
@@ -67,8 +68,8 @@ std::optional<Switch> switchWithJerk(const Phases& phases, DoubleDouble length,
   DoubleDouble left = length;  // the distance that is left at the beginning of a phase
   for (std::size_t i = 0; i < phases.size(); ++i) {
     const Phase& phase = phases[i];
-    // How much of the distance is missing if the motion leaves the phase at a time and stops as
-    // fast as possible: it falls with the time.
+    // The distance that is missing if the motion leaves the phase at a time and stops as fast as
+    // possible. It falls with the time.
     const auto rough = [&](double t) {
       const Advance<double> end = advance(phase.v.hi, phase.a.hi, phase.j, t);
       const RoughStop stop = roughStop(end.v, end.a, phase.j, limits);

@@ -13,9 +13,9 @@ class Stop {
 
   DoubleDouble length() const { return length_; }  ///< [microsteps] signed
 
-  /// Whether the stop may end there: this far [microsteps] from where it does. The length is
-  /// uncertain because the velocity and the acceleration are rounded to doubles, by a thousandth of
-  /// a microstep at most.
+  /// Whether the stop may end at a place this far [microsteps] from where it ends. The length is
+  /// uncertain by a thousandth of a microstep at most, because the velocity and the acceleration
+  /// are rounded to doubles.
   bool meets(double distance) const;
 
  private:
@@ -32,7 +32,7 @@ class Stop {
 /// it ends.
 struct Approach {
   Phases phases;
-  std::size_t first_part = 0;  ///< number of its phases
+  std::size_t first_part = 0;  ///< the number of its phases
 };
 
 /// The fastest motion to rest over `length` from a velocity and an acceleration. It begins with the

@@ -11,10 +11,11 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kForever = 3.0e9;           // s, 95 years
-constexpr double kFarthestJog = 1.15292e18;  // microsteps, 2^60: fits into a Split, with room
+constexpr double kForever = 3.0e9;  // [s] 95 years
+// [microsteps] 2^60: it fits into a Split, with room to spare.
+constexpr double kFarthestJog = 1.15292e18;
 
-constexpr double kRounding = 1e-15;  // relative, of a state's doubles
+constexpr double kRounding = 1e-15;  // of the doubles of a state, relative to them
 
 }  // namespace
 
@@ -103,7 +104,7 @@ std::int64_t MotionBuilder::nextRest(const MotionLimits& limits) const {
 void MotionBuilder::add(const Approach& part, DoubleDouble end) {
   const Phases& phases = part.phases;
   pieces_.reserve(pieces_.size() + phases.size());
-  DoubleDouble left;  // what is left of the second part
+  DoubleDouble left;  // the remaining distance of the second part
   for (std::size_t i = part.first_part; i < phases.size(); ++i)
     left = left + phases[i].displacement;
   for (std::size_t i = 0; i < phases.size(); ++i) {

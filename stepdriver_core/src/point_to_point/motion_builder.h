@@ -16,7 +16,7 @@ class MotionBuilder {
 
   /// Comes to rest on `target` as fast as possible.
   void moveTo(std::int64_t target, const MotionLimits& limits);
-  /// The same. @param stop from the current velocity and acceleration.
+  /// The same. @param stop a stop from the current velocity and acceleration.
   void moveTo(std::int64_t target, const Stop& stop, const MotionLimits& limits);
   /// Turns at `target`, which it reaches against the direction `sign`, with the acceleration that
   /// this needs. @return false if the turning point lies beyond the target; nothing is added.
@@ -33,12 +33,12 @@ class MotionBuilder {
   DoubleDouble v() const { return v_; }
   DoubleDouble a() const { return a_; }
 
-  /// All parts; the last call.
+  /// All parts of the motion. It is the last call.
   Profile profile(std::int64_t start_ns);
 
  private:
-  // Corrects a velocity that only rounding to doubles has moved off that of a change to a limit or
-  // to rest: otherwise there would be slivers.
+  // A velocity may differ from that at the end of a change to a limit or to rest by rounding only.
+  // Such a velocity is corrected, because otherwise there would be slivers.
   void unround(const MotionLimits& limits);
   void add(const Approach& part, DoubleDouble end);
 

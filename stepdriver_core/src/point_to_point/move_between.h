@@ -8,11 +8,11 @@
 
 namespace stepdriver::motion {
 
-/// Plans a motion to a place between two counts of an axis, which one that shares motors may come
-/// to rest at: counts as seen from there.
+/// Plans a motion of an axis that shares motors to a place at which it may come to rest between two
+/// of its own counts. Counts are then seen from that place.
 ///
-/// @param between [microsteps] the place minus a count.
-/// @param plan_to_count makes the plan from a state to that count.
+/// @param between [microsteps] the place minus a count
+/// @param plan_to_count plans the motion from a state to that count
 template <typename PlanToCount>
 Plan planBetween(double between, const MotionState& from, const PlanToCount& plan_to_count) {
   if (between == 0.0) return plan_to_count(from);

@@ -8,9 +8,9 @@
 namespace stepdriver::motion {
 namespace {
 
-// Of the acceleration, at least, however small a correction is.
+// The smallest acceleration for a correction, as a part of the limit.
 constexpr double kSoftest = 0.02;
-constexpr double kSpeedRounding = 1e-9;  // relative
+constexpr double kSpeedRounding = 1e-9;  // relative to the speed
 
 // The motion as seen from the point.
 Profile relativeMove(const MotionState& from, const MovingTarget& point, const MotionLimits& limits,

@@ -26,10 +26,10 @@ struct MovingTarget {
 std::vector<Piece> planIntercept(const MotionState& from, const MovingTarget& point,
                                  const MotionLimits& limits, double within);
 
-/// The state at the end of pieces. @param from if there are no pieces.
+/// The state at the end of pieces; `from` if there are none.
 MotionState endOf(const std::vector<Piece>& pieces, const MotionState& from);
 
-/// The first `seconds` of pieces.
+/// The part of the pieces in the first `seconds`.
 std::vector<Piece> firstPart(std::vector<Piece> pieces, DoubleDouble seconds);
 
 }  // namespace stepdriver::motion

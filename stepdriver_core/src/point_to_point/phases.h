@@ -10,11 +10,11 @@ namespace stepdriver::motion {
 
 /// A time of constant jerk, with the velocity and acceleration at its beginning.
 struct Phase {
-  DoubleDouble duration;      // s, above 0
-  DoubleDouble v;             // microsteps/s
-  DoubleDouble a;             // microsteps/s^2
-  double j = 0.0;             // microsteps/s^3
-  DoubleDouble displacement;  // microsteps, signed
+  DoubleDouble duration;      // [s] above 0
+  DoubleDouble v;             // [microsteps/s]
+  DoubleDouble a;             // [microsteps/s^2]
+  double j = 0.0;             // [microsteps/s^3]
+  DoubleDouble displacement;  // [microsteps] signed
 };
 
 /// A sequence of phases, built from a velocity and an acceleration: a motion whose position and
@@ -32,7 +32,7 @@ class Phases {
   /// Continues from another velocity and acceleration: a jump, or the exact value for a rounded
   /// one.
   void settle(DoubleDouble v, DoubleDouble a);
-  /// Leaves only the first `count` phases, of more than these.
+  /// Keeps only the first `count` phases. @pre there are at least that many.
   void cut(std::size_t count);
 
   /// [microsteps] signed

@@ -6,12 +6,12 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr std::int64_t kShortestPeriod = 1'000'000;
-// The period of the slowest stream, 20 Hz, and half of it for a message that comes late. What comes
+// The period of the slowest stream, 20 Hz, plus half of it for a message that comes late. Setpoints
 // at longer intervals are single positions: a velocity between them would lead beyond the last one.
 constexpr std::int64_t kLongestInterval = 75'000'000;
-// A time may be smoothed into the future by this, and then delays the motion.
+// A time is smoothed into the future by no more than this, because that delays the motion.
 constexpr std::int64_t kMostDelay = 1'000'000;
-// How much of a deviation from the expected time is believed.
+// The part of a deviation from the expected time that changes the estimate.
 constexpr std::int64_t kTimePart = 4;
 constexpr std::int64_t kPeriodPart = 16;
 // A single long or short interval changes the period by at most this factor.

@@ -9,7 +9,7 @@ namespace stepdriver::motion {
 /// position changes. Times of arrival jitter, so the period and the times are smoothed.
 class SetpointStream {
  public:
-  /// What is known when a setpoint has come.
+  /// The estimate after a setpoint has come.
   struct Course {
     std::int64_t came_ns = 0;    ///< motion time at which it came, smoothed
     std::int64_t period_ns = 0;  ///< the stream's period; 0: it is the first setpoint

@@ -11,7 +11,7 @@ Real square(Real x) {
   return x * x;
 }
 
-// The state seen in the direction of the change, so that the velocity always rises.
+// The state as seen in the direction of the change, so that the velocity always rises.
 template <typename End>
 class Mirrored {
  public:

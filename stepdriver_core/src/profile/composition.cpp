@@ -14,7 +14,7 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr int kSlices = 8;  // points of a part to examine
+constexpr int kSlices = 8;  // the points of a part at which the limits are checked
 
 DoubleDouble velocityOf(const Piece& piece) { return {piece.v0, piece.v0_rest}; }
 DoubleDouble accelerationOf(const Piece& piece) { return {piece.a, piece.a_rest}; }
@@ -24,18 +24,18 @@ bool hasConstantRate(const Piece& path) { return path.a == 0.0 && path.j == 0.0;
 // A part of a piece of a curve, and the corresponding part of a piece of the path.
 struct Part {
   Piece curve;
-  DoubleDouble from;  // s in the curve's piece
+  DoubleDouble from;  // the place s in the curve's piece
   Piece path;
-  DoubleDouble begin;  // t in the path's piece
+  DoubleDouble begin;  // [s] the time in the path's piece
   DoubleDouble end;
-  DoubleDouble length;  // in s
+  DoubleDouble length;  // the distance along s
 
   DoubleDouble placeAt(DoubleDouble t) const {
     return from + (path.positionAt(t) - path.positionAt(begin));
   }
 };
 
-// An upper bound of the absolute value for q(s(t)).
+// An upper bound of |d^4 q(s(t))/dt^4|.
 double largestFourthDerivative(const Part& part) {
   const DoublePiece path(part.path);
   const DoublePiece curve(part.curve);
@@ -67,8 +67,8 @@ void appendCubics(std::vector<Piece>& pieces, const Part& part) {
   }
 }
 
-// The time at which a piece of the path has covered a distance, to a double's precision. The path
-// only goes forwards: Newton's steps, kept inside a bracket.
+// The time at which a piece of the path has covered a distance, as exactly as a double can be. The
+// path only goes forwards, so Newton's method is used, within a bracket.
 double roughTimeTo(const DoublePiece& path, double way) {
   double low = 0.0;
   double high = path.duration;
@@ -88,7 +88,7 @@ double roughTimeTo(const DoublePiece& path, double way) {
 // The time from the beginning of a piece of the path at which it has covered a distance.
 DoubleDouble timeTo(const Piece& path, DoubleDouble way) {
   if (path.j != 0.0) {
-    // Two of Newton's steps give all bits, unless the path is nearly at rest there.
+    // Two steps of Newton's method give all bits, unless the path is nearly at rest there.
     const DoublePiece rough(path);
     const double near = roughTimeTo(rough, way.value());
     if (rough.velocity(near) > 1e-3) {
@@ -180,7 +180,7 @@ bool staysWithin(const Profile& curve, const Piece& stretch, const MotorBounds& 
   const DoublePiece path(stretch);
   const double length = (stretch.positionAt(stretch.duration) - stretch.p0).value();
   double t = 0.0;
-  double way = 0.0;  // along the path, from the beginning of the stretch
+  double way = 0.0;  // the distance along the path from the beginning of the stretch
   for (std::size_t index = curve.pieceAt(stretch.p0);; ++index) {
     const bool last = index + 1 == curve.pieceCount();
     const double knot = (curve.pieceStart(index + 1) - stretch.p0).value();

@@ -29,16 +29,16 @@ Profile composeAlong(const std::shared_ptr<const Profile>& curve, const Profile&
 /// [microsteps]
 constexpr double kComposeError = 0.01;
 
-/// The limits of a motor.
+/// The limits of a motor in microsteps.
 struct MotorBounds {
   double acceleration = 0.0;  ///< [microsteps/s^2]
   double jerk = 0.0;          ///< [microsteps/s^3] 0: no limit
 };
 
-/// Whether q(s(t)) respects the limits while the rate changes; elsewhere it is the curve itself,
-/// at full speed or slower. It is examined at nine points of each polynomial part, including the
-/// ends; between them it may exceed the limits by less than a hundredth. Costs nothing for the
-/// parts of the path at a constant rate.
+/// Whether q(s(t)) respects the limits while the rate changes; elsewhere the motion is the curve
+/// itself, at full speed or slower. Each polynomial part is examined at nine points, including its
+/// ends; between them the motion may exceed the limits by less than a hundredth. The parts of the
+/// path at a constant rate cost nothing.
 bool staysWithin(const Profile& curve, const Profile& path, const MotorBounds& bounds);
 
 }  // namespace stepdriver::motion

@@ -22,7 +22,7 @@ struct DoublePiece {
         a(piece.a),
         j(piece.j) {}
 
-  /// @name At t [s] from the beginning of the piece; the way is from p0
+  /// @name Values at t [s] from the beginning of the piece; way() is the distance from p0
   /// @{
   double displacement(double t) const { return t * (v0 + t * (a / 2.0 + t * (j / 6.0))); }
   double velocity(double t) const { return v0 + t * (a + t * (j / 2.0)); }

@@ -10,9 +10,9 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kTurn = 6.283185307179586;  // 2 pi
-constexpr double kAllowed = 0.05;            // V
+constexpr double kAllowed = 0.05;            // the oscillation that may be left, V in the formulas
 
-/// A damped oscillation.
+/// A damped oscillation with the period T.
 struct Oscillation {
   double period_s;  // T
   double damping;   // d / sqrt(1 - d^2)
@@ -21,7 +21,7 @@ struct Oscillation {
       : period_s(1.0 / (frequency * std::sqrt(1.0 - ratio * ratio))),
         damping(ratio / std::sqrt(1.0 - ratio * ratio)) {}
 
-  /// Made after a part of its period, so that it meets what remains of the oscillation then.
+  /// An impulse after a part of the period, as large as what then remains of the oscillation.
   Impulse impulse(double part, double periods) const {
     return {part * std::exp(-kTurn * damping * periods), nanoseconds(periods * period_s)};
   }

@@ -48,8 +48,9 @@ class InputShaper {
   /// The most parts of a shaper: two 2HUMP_EI have that many.
   static constexpr std::size_t kMostImpulses = 16;
 
-  /// @name For one oscillation
-  /// @param frequency [Hz] above 0 @param damping its damping ratio: from 0 to below 1
+  /// @name Shapers for one oscillation
+  /// @param frequency [Hz] above 0
+  /// @param damping its damping ratio: from 0 to below 1
   /// @{
   static InputShaper zv(double frequency, double damping);
   static InputShaper mzv(double frequency, double damping);
@@ -57,11 +58,11 @@ class InputShaper {
   static InputShaper twoHumpEi(double frequency, double damping);
   /// @}
 
-  /// For the oscillations of both: the parts of this one, each shaped by the other one.
-  /// @pre The product of their numbers of parts is at most kMostImpulses.
+  /// A shaper for two oscillations, this one's and the other one's: the other shapes each part of
+  /// this one. @pre The product of their numbers of parts is at most kMostImpulses.
   InputShaper with(const InputShaper& other) const;
 
-  /// By their delays, which differ.
+  /// The parts in the order of their delays, which all differ.
   const std::vector<Impulse>& impulses() const { return impulses_; }
   /// How much later the shaped motion ends.
   std::int64_t durationNs() const { return impulses_.back().delay_ns; }

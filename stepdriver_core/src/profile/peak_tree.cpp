@@ -8,7 +8,7 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kTimeRounding = 1e-12;  // s: times are sums of doubles
+constexpr double kTimeRounding = 1e-12;  // [s] because times are sums of doubles
 
 }  // namespace
 

@@ -13,7 +13,7 @@ struct PositionRange {
   double highest = 0.0;
 };
 
-/// Takes time in proportion to the number of pieces.
+/// It takes time in proportion to the number of pieces.
 PositionRange positionRangeOf(const Profile& profile);
 
 /// How far a motion from one position passes a target before it comes back to it [microsteps]; 0 if

@@ -36,7 +36,7 @@ double Piece::firstTurn(double after) const {
     return first;
   }
   const double discriminant = a * a - 2.0 * j * v0;
-  if (discriminant <= 0.0) return first;  // never, or a touch without a change of sign
+  if (discriminant <= 0.0) return first;  // it never turns, or it only touches a velocity of 0
   const double q = -(a + std::copysign(std::sqrt(discriminant), a));
   consider(q / j);
   if (q != 0.0) consider(2.0 * v0 / q);
@@ -128,7 +128,7 @@ void Profile::finish() {
   end_position_ = last.positionAt(last.duration);
 }
 
-// nullptr: all pieces are its own.
+// nullptr if all pieces are its own.
 const Profile::Section* Profile::sectionOf(std::size_t piece) const {
   const Section* section = nullptr;
   for (const Section& next : sections_) {
@@ -182,7 +182,7 @@ DoubleDouble Profile::pieceStart(std::size_t index) const {
 
 std::size_t Profile::pieceAt(DoubleDouble time) const {
   const Section* section = nullptr;
-  std::size_t end = piece_count_;  // the end of the section's pieces
+  std::size_t end = piece_count_;  // the end of the pieces that the section covers
   for (const Section& next : sections_) {
     if (section != nullptr && time < next.start) {
       end = next.first;

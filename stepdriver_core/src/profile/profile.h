@@ -43,7 +43,7 @@ class Profile;
 /// A part of a shared profile, at a constant rate: the pieces from `from` to `to`, each `rate`
 /// times as fast. It takes the same memory however long it is; its pieces are computed on demand.
 struct Excerpt {
-  std::shared_ptr<const Profile> of;  ///< moves
+  std::shared_ptr<const Profile> of;  ///< the profile, which moves
   DoubleDouble from;                  ///< [s] after its start, before its end
   DoubleDouble to;                    ///< [s] later; at most its end, apart from rounding
   DoubleDouble rate = 1.0;            ///< above 0
@@ -70,7 +70,7 @@ class Sections {
 /// or its time still takes O(log n).
 class Profile {
  public:
-  /// No motion: rest at `position`.
+  /// A motion that rests at `position`.
   Profile(std::int64_t start_ns, DoubleDouble position);
 
   /// @param pieces each begins where the one before it ends; at least one.
@@ -85,7 +85,7 @@ class Profile {
 
   /// Motion time at which the first piece begins.
   std::int64_t startNs() const { return start_ns_; }
-  /// The end of the motion, to the nearest nanosecond; no step is later.
+  /// The end of the motion, to the nearest nanosecond. No step is later.
   std::int64_t endNs() const { return end_ns_; }
   DoubleDouble duration() const { return duration_; }  ///< [s]
   /// The final position [microsteps].
@@ -95,23 +95,24 @@ class Profile {
   /// counts.
   double peakSpeed() const { return peak_speed_; }
 
-  /// At rest before the start and after the end.
+  /// The state at a time. Before the start and after the end, the motion is at rest.
   MotionState stateAt(std::int64_t time_ns) const;
 
   std::size_t pieceCount() const { return piece_count_; }
   Piece piece(std::size_t index) const;
-  /// When a piece begins, counted from the start [s]; for the index after the last piece: the end.
+  /// The time at which a piece begins, counted from the start [s]. With the index after the last
+  /// piece it is the end.
   DoubleDouble pieceStart(std::size_t index) const;
-  /// The piece at a time after the start [s]; before the start it is the first, after the end the
-  /// last. @pre there are pieces.
+  /// The piece at a time after the start [s]. Before the start it is the first one, after the end
+  /// the last one. @pre there are pieces.
   std::size_t pieceAt(DoubleDouble time) const;
 
   class Pieces;
-  /// In the order of time; empty if nothing moves. The profile must outlive them.
+  /// The pieces in the order of time; empty if nothing moves. The profile must outlive them.
   Pieces pieces() const;
 
  private:
-  // The source of the pieces from `first` on: `of`, or if that is null, pieces_ from `own` on.
+  // Where the pieces from `first` on are: in `of`, or if that is null, in pieces_ from `own` on.
   struct Section {
     std::size_t first = 0;
     DoubleDouble start;  // s
@@ -121,7 +122,7 @@ class Profile {
     DoubleDouble to;
     DoubleDouble rate;
     DoubleDouble shift;
-    std::size_t of_first = 0;  // piece of it
+    std::size_t of_first = 0;  // the piece of `of` at which this begins
     std::size_t of_last = 0;
   };
 

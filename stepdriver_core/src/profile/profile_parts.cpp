@@ -10,7 +10,7 @@
 namespace stepdriver::motion {
 namespace {
 
-// Goes through a profile from a time after its start on.
+// Goes through a profile, from a time after its start on.
 class Walk {
  public:
   explicit Walk(const Profile& profile, DoubleDouble from = {}) : profile_(profile), time_(from) {
@@ -19,12 +19,13 @@ class Walk {
     while (index_ < count && !(left().hi > kNegligibleTime)) ++index_;
   }
 
-  /// How long the current polynomial lasts; empty if the motion has ended.
+  /// Whether the motion continues.
   bool moves() const { return index_ < profile_.pieces().size(); }
+  /// [s] How long the current piece still lasts. @pre moves()
   DoubleDouble left() const { return profile_.pieceStart(index_ + 1) - time_; }
 
-  /// The next part of it.
-  Piece take(DoubleDouble duration) {
+  /// The next part of the current polynomial, which lasts this long.
+  Piece advance(DoubleDouble duration) {
     if (!moves()) return {duration, profile_.endPosition()};
     const DoubleDouble t = time_ - profile_.pieceStart(index_);
     const Piece taken = partOf(profile_.pieces()[index_], t, duration);
@@ -61,7 +62,7 @@ Profile part(const Profile& profile, DoubleDouble from, DoubleDouble to) {
   while ((to - time).hi > kNegligibleTime) {
     const DoubleDouble left = to - time;
     const DoubleDouble duration = walk.moves() ? std::min(walk.left(), left) : left;
-    pieces.push_back(walk.take(duration));
+    pieces.push_back(walk.advance(duration));
     time = time + duration;
   }
   if (pieces.empty()) return {profile.startNs(), profile.startPosition()};
@@ -77,7 +78,7 @@ Profile sum(const Profile& a, const Profile& b) {
                                   : !of_a.moves() ? of_b.left()
                                                   : std::min(of_a.left(), of_b.left());
     giveWayAt(pieces.size());
-    pieces.push_back(sumOf(of_a.take(duration), of_b.take(duration)));
+    pieces.push_back(sumOf(of_a.advance(duration), of_b.advance(duration)));
   }
   if (pieces.empty()) return {a.startNs(), a.endPosition() + b.endPosition()};
   return {a.startNs(), std::move(pieces)};

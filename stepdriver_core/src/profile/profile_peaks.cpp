@@ -10,20 +10,20 @@
 namespace stepdriver::motion {
 namespace {
 
-void takeFurthest(Peak& peak, double value, double time_s) {
+void includeFurthest(Peak& peak, double value, double time_s) {
   if (std::abs(value) > std::abs(peak.value)) peak = {value, time_s};
 }
 
-void takePosition(ProfilePeaks& peaks, double position, double time_s) {
+void includePosition(ProfilePeaks& peaks, double position, double time_s) {
   if (position < peaks.lowest.value) peaks.lowest = {position, time_s};
   if (position > peaks.highest.value) peaks.highest = {position, time_s};
 }
 
 // At a velocity of 0 inside the piece, the position has an extremum.
-void takeTurns(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
+void includeTurns(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
   const auto consider = [&](double t) {
     if (t > 0.0 && t < piece.duration)
-      takePosition(peaks, piece.p0 + piece.displacement(t), start + t);
+      includePosition(peaks, piece.p0 + piece.displacement(t), start + t);
   };
   if (piece.j == 0.0) {
     if (piece.a != 0.0) consider(-piece.v0 / piece.a);
@@ -37,27 +37,27 @@ void takeTurns(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
   if (q != 0.0) consider(2.0 * piece.v0 / q);
 }
 
-void takePiece(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
+void includePiece(ProfilePeaks& peaks, const DoublePiece& piece, double start) {
   const double end = piece.duration;
-  takePosition(peaks, piece.p0, start);
-  takePosition(peaks, piece.p0 + piece.displacement(end), start + end);
+  includePosition(peaks, piece.p0, start);
+  includePosition(peaks, piece.p0 + piece.displacement(end), start + end);
 
   const double last = piece.velocity(end);
   double lowest = std::min(piece.v0, last);
   double highest = std::max(piece.v0, last);
-  takeFurthest(peaks.velocity, piece.v0, start);
+  includeFurthest(peaks.velocity, piece.v0, start);
   const double middle = piece.j != 0.0 ? -piece.a / piece.j : 0.0;
   if (middle > 0.0 && middle < end) {
     const double velocity = piece.velocity(middle);
     lowest = std::min(lowest, velocity);
     highest = std::max(highest, velocity);
-    takeFurthest(peaks.velocity, velocity, start + middle);
+    includeFurthest(peaks.velocity, velocity, start + middle);
   }
-  takeFurthest(peaks.velocity, last, start + end);
-  if (lowest <= 0.0 && highest >= 0.0) takeTurns(peaks, piece, start);
+  includeFurthest(peaks.velocity, last, start + end);
+  if (lowest <= 0.0 && highest >= 0.0) includeTurns(peaks, piece, start);
 
-  takeFurthest(peaks.acceleration, piece.a, start);
-  takeFurthest(peaks.acceleration, piece.acceleration(end), start + end);
+  includeFurthest(peaks.acceleration, piece.a, start);
+  includeFurthest(peaks.acceleration, piece.acceleration(end), start + end);
 }
 
 }  // namespace
@@ -73,22 +73,23 @@ ProfilePeaks profilePeaks(const Profile& profile, double velocity_before, double
     giveWayAt(index);
     const DoublePiece piece(profile.piece(index));
     const double start = profile.pieceStart(index).value();
-    takeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
-    takePiece(peaks, piece, start);
+    includeFurthest(peaks.velocity_jump, piece.v0 - velocity, start);
+    includePiece(peaks, piece, start);
     velocity = piece.velocity(piece.duration);
   }
-  takeFurthest(peaks.velocity_jump, velocity_after - velocity, profile.duration().value());
+  includeFurthest(peaks.velocity_jump, velocity_after - velocity, profile.duration().value());
   return peaks;
 }
 
 ProfilePeaks joinPeaks(const ProfilePeaks& before, const ProfilePeaks& part, double time_s) {
   ProfilePeaks peaks = before;
   for (const Peak& peak : {part.lowest, part.highest}) {
-    takePosition(peaks, peak.value, time_s + peak.time_s);
+    includePosition(peaks, peak.value, time_s + peak.time_s);
   }
-  takeFurthest(peaks.velocity, part.velocity.value, time_s + part.velocity.time_s);
-  takeFurthest(peaks.acceleration, part.acceleration.value, time_s + part.acceleration.time_s);
-  takeFurthest(peaks.velocity_jump, part.velocity_jump.value, time_s + part.velocity_jump.time_s);
+  includeFurthest(peaks.velocity, part.velocity.value, time_s + part.velocity.time_s);
+  includeFurthest(peaks.acceleration, part.acceleration.value, time_s + part.acceleration.time_s);
+  includeFurthest(peaks.velocity_jump, part.velocity_jump.value,
+                  time_s + part.velocity_jump.time_s);
   return peaks;
 }
 

@@ -38,23 +38,24 @@ class ProfileSum {
   std::int64_t startNs() const { return start_ns_; }
 
  private:
-  // A term, or a part of one that is shaped.
+  // A term, or one part of a term that is shaped.
   struct Part {
     std::size_t term = 0;
     DoubleDouble factor;
     const Profile* profile = nullptr;  // null: it rests
-    DoubleDouble position;             // at rest
-    DoubleDouble since;                // s from the part's start to that of the sum
+    DoubleDouble position;             // at which it rests
+    DoubleDouble since;                // [s] from the part's start to that of the sum
     std::size_t piece = 0;
   };
 
   void addPart(DoubleDouble factor, const Profile& profile, std::int64_t start_ns);
-  /// Adds what a part does from a time on. @return when that ends; the time itself: never.
+  /// Adds the motion of a part from a time on. @return when this motion ends; the time itself if it
+  /// doesn't.
   DoubleDouble addPiece(Part& part, DoubleDouble from);
 
   std::array<Part, kMostTerms * InputShaper::kMostImpulses> parts_{};
-  std::size_t size_ = 0;   // how many there are
-  std::size_t terms_ = 0;  // how many were added
+  std::size_t size_ = 0;   // the number of parts
+  std::size_t terms_ = 0;  // the number of terms that were added
   std::int64_t start_ns_ = 0;
   DoubleDouble piece_start_;
   DoubleDouble piece_end_;

@@ -35,7 +35,7 @@ PlannedMotion PlannedMotion::takenOverBy(std::shared_ptr<const Profile> plan) co
   const DoubleDouble from = secondsOf(start - profile_->startNs());
   const DoubleDouble until = secondsOf(at - profile_->startNs());
   const bool moves = next.plan_->pieceCount() > 0;
-  // At rest, the time until then doesn't belong to what is still to be made.
+  // If the new plan rests, only the end of the motion before it is still to be made.
   const DoubleDouble to = moves ? until : std::min(until, profile_->duration());
   Sections sections;
   if ((to - from).hi > kNegligibleTime) {

@@ -16,29 +16,29 @@ namespace stepdriver::motion {
 /// are computed on demand, by a ProfileSum: any profile can be shaped without going through it.
 class ShapedProfile {
  public:
-  /// No motion.
+  /// A motion that makes no step.
   ShapedProfile() = default;
-  /// As it is.
+  /// A profile that is made as it is.
   ShapedProfile(const Profile* profile)  // NOLINT: a profile is one of these
       : profile_(profile), start_ns_(profile != nullptr ? profile->startNs() : 0) {}
-  /// @param profile with everything before the start that the parts still have to make.
+  /// @param profile the profile, with everything before the start that the parts still have to make
   ShapedProfile(const Profile& profile, const InputShaper& shaper, std::int64_t start_ns)
       : profile_(&profile), shaper_(&shaper), start_ns_(start_ns) {}
 
   explicit operator bool() const { return profile_ != nullptr; }
 
-  /// @name Of a motion, as those of a profile
+  /// @name The same as of a profile
   /// @{
   std::int64_t startNs() const { return start_ns_; }
   std::int64_t endNs() const;
   DoubleDouble endPosition() const { return profile_->endPosition(); }
   double peakSpeed() const { return profile_->peakSpeed(); }
-  /// Before the start, it is what the motion before it was.
+  /// Before the start, the motion before it counts.
   MotionState stateAt(std::int64_t time_ns) const;
   /// @}
 
   const Profile& profile() const { return *profile_; }
-  /// nullptr: as it is.
+  /// nullptr: the profile is made as it is.
   const InputShaper* shaper() const { return shaper_; }
 
  private:
@@ -70,7 +70,7 @@ class PlannedMotion {
 
  private:
   std::shared_ptr<const Profile> plan_;
-  std::shared_ptr<const Profile> profile_;  // the same, with what comes before it
+  std::shared_ptr<const Profile> profile_;  // the same profile with what comes before it
   std::shared_ptr<const InputShaper> shaper_;
 };
 

@@ -7,10 +7,10 @@ namespace stepdriver::motion {
 namespace {
 
 // From this time on, the error of a double with 53 bits exceeds 1/32 ns.
-constexpr double kFar = 281474.976710656;  // s, 2^48 ns, 78 hours
+constexpr double kFar = 281474.976710656;  // [s] 2^48 ns, 78 hours
 
 // Up to this time, the rounding of a stretch's reciprocals causes an error below 1/64 ns.
-constexpr double kShort = 20000.0;  // s
+constexpr double kShort = 20000.0;  // [s]
 
 // Whether a ramp takes less than this from standstill to its fast end, and makes a microstep within
 // it. A residual of a sum is no such ramp.
@@ -49,7 +49,7 @@ StepFinder::StepFinder(ProfileSum& sum, std::int64_t count) : sum_(&sum), start_
 
 // Inline, because every step uses these two.
 inline double StepFinder::cubicTime(double way) {
-  constexpr double kNear = 1e-13;  // s
+  constexpr double kNear = 1e-13;  // [s]
   Stretch& s = stretch_;
   // This order shortens the chain of operations that wait for the last step.
   const double before = 4.0 * s.last[2] - 6.0 * s.last[1] - s.last[3];
@@ -207,7 +207,7 @@ void StepFinder::chooseCurve(bool constant_speed, double fastest) {
   using Curve = Stretch::Curve;
   Stretch& s = stretch_;
   if (constant_speed) {
-    // A microstep takes less than kShort, too.
+    // A microstep takes less time than kShort, too.
     const bool is_short = s.duration < kShort && s.v * kShort > 1.0;
     s.curve = is_short ? Curve::kShortLine : Curve::kLine;
     s.ns_per_unit = s.ns_per_s / s.v;
@@ -228,7 +228,7 @@ double StepFinder::bracketedTime(double way) const {
 
   double t = s.last[0];
   double speed = speed_at(t);
-  // 100 halvings reach the last bit even if Newton's steps leave the bracket every time.
+  // 100 halvings reach the last bit even if each step of Newton's method leaves the bracket.
   for (int i = 0; i < 100; ++i) {
     const double error = way_at(t) - way;
     if (error == 0.0) return t;

@@ -41,8 +41,8 @@ class StepFinder {
   /// @param profile outlives the finder.
   /// @param count the position of the axis: within one step of the profile's beginning.
   StepFinder(const Profile& profile, std::int64_t count);
-  /// Of a motor that several axes share.
-  /// @param sum outlives the finder, which calls its next().
+  /// Finds the steps of a motor that several axes share. @param sum outlives the finder, which
+  /// calls its next().
   StepFinder(ProfileSum& sum, std::int64_t count);
 
   /// @return false if no step is left; `step` is then unchanged.
@@ -56,7 +56,7 @@ class StepFinder {
   // ("anchor"): the distance from there is v t + a t^2/2 + j t^3/6, with t counted away from the
   // anchor.
   struct Stretch {
-    // The first two are for all except the longest stretches.
+    // Formulas for short stretches are used for all except the longest ones.
     enum class Curve { kShortLine, kShortParabola, kLine, kParabola, kCubic };
     Curve curve = Curve::kLine;
     int direction = 0;       // the direction of the motion
@@ -76,13 +76,13 @@ class StepFinder {
     double v_squared = 0.0;
     double twice_a = 0.0;
     double ns_per_s = 1e9;     // with time_sign
-    double ns_per_unit = 0.0;  // ns_per_s / v of a kShortLine, ns_per_s / a of a kShortParabola
+    double ns_per_unit = 0.0;  // ns_per_s / v for a kShortLine, ns_per_s / a for a kShortParabola
     double duration = 0.0;     // s
     DoubleDouble exact_v;      // v and a with all their bits
     DoubleDouble exact_a;
-    // s from the anchor: the times of the last steps, the latest first.
+    // [s] The times of the last steps from the anchor, the latest first.
     std::array<double, 4> last = {};
-    int known = 0;  // how many of these are known
+    int known = 0;  // how many of these times are known
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
   };
@@ -92,7 +92,7 @@ class StepFinder {
   void enter(const Piece& piece, DoubleDouble begin, DoubleDouble end, DoubleDouble piece_start);
   void chooseCurve(bool constant_speed, double fastest);
   bool give(Step& step, std::int64_t time_ns);
-  // Rare or long code: inlined, it would give next() a stack frame.
+  // These functions are rare or long: if they were inlined, next() would need a stack frame.
   [[gnu::noinline]] bool nextOfNewStretch(Step& step);
   [[gnu::noinline]] bool nextOfOther(Step& step, double way);
   double timeFromAnchor(double way);
@@ -101,10 +101,10 @@ class StepFinder {
   std::int64_t refined(double rough) const;
 
   const Profile* profile_ = nullptr;
-  ProfileSum* sum_ = nullptr;  // instead of a profile
-  std::int64_t start_ns_ = 0;  // the start of either
+  ProfileSum* sum_ = nullptr;  // null if the steps are those of a profile
+  std::int64_t start_ns_ = 0;  // motion time at which the profile or the sum begins
   std::size_t piece_ = 0;
-  double done_ = 0.0;  // s of the piece that earlier stretches have covered
+  double done_ = 0.0;  // [s] the part of the piece that earlier stretches have covered
   Stretch stretch_;
 };
 

@@ -16,12 +16,12 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kRoundedPosition = 1e-9;  // microsteps: rounding
-constexpr double kNoTravel = 0.5;          // microsteps
-constexpr double kNoRoom = 0.001;          // of a limit
+constexpr double kRoundedPosition = 1e-9;  // [microsteps] a smaller difference is rounding
+constexpr double kNoTravel = 0.5;          // [microsteps] shorter ways make no step
+constexpr double kNoRoom = 0.001;          // less than this part of a limit is no room
 constexpr double kLonger = 1.1;
 
-// The joint reverses at a time.
+// A time at which the joint reverses, and its direction afterwards.
 struct Turn {
   double time_s;
   double sign;
@@ -31,27 +31,28 @@ class Turns {
  public:
   explicit Turns(DoubleDouble start) : furthest_(start) {}
 
-  /// A piece that begins at a time [s].
-  void take(const Piece& piece, double start) {
+  /// Adds a piece that begins at a time [s].
+  void add(const Piece& piece, double start) {
     const double end = piece.duration.value();
     // A turn next to an end of the piece is that end, whose time has no rounding error.
     const double margin = 1e-9 * end;
     for (double t = piece.firstTurn(0.0); t < end; t = piece.firstTurn(t)) {
-      if (t > margin && t < end - margin) take(piece.positionAt(t), start + t);
+      if (t > margin && t < end - margin) addPosition(piece.positionAt(t), start + t);
     }
-    take(piece.positionAt(piece.duration), start + end);
+    addPosition(piece.positionAt(piece.duration), start + end);
   }
   const std::vector<Turn>& found() const { return found_; }
-  /// Whether both find the same turns from now on. @param later how much the other one's times are.
+  /// Whether both find the same turns from now on. @param later by how much the times of the other
+  /// one are earlier.
   bool coincideWith(const Turns& other, double later) const {
     return sign_ != 0.0 && sign_ == other.sign_ && (furthest_ - other.furthest_).hi == 0.0 &&
            std::abs(time_s_ - (other.time_s_ + later)) < kSameTime;
   }
 
  private:
-  static constexpr double kSameTime = 1e-9;  // s
+  static constexpr double kSameTime = 1e-9;  // [s]
 
-  void take(DoubleDouble position, double time_s) {
+  void addPosition(DoubleDouble position, double time_s) {
     const double way = (position - furthest_).value();
     if (sign_ != 0.0 && way * sign_ > 0.0) {
       furthest_ = position;
@@ -64,8 +65,8 @@ class Turns {
     }
   }
 
-  DoubleDouble furthest_;  // in the current direction
-  double time_s_ = 0.0;    // when it reached it
+  DoubleDouble furthest_;  // the furthest position in the current direction
+  double time_s_ = 0.0;    // [s] the time at which the joint reached it
   double sign_ = 0.0;
   std::vector<Turn> found_;
 };
@@ -73,12 +74,12 @@ class Turns {
 std::vector<Turn> turnsOf(const Profile& joint) {
   Turns turns(joint.startPosition());
   for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
-    turns.take(joint.piece(i), joint.pieceStart(i).value());
+    turns.add(joint.piece(i), joint.pieceStart(i).value());
   }
   return turns.found();
 }
 
-// The joint's highest values between two times.
+// Returns the joint's highest values between two times.
 using PeaksBetween = std::function<Highest(DoubleDouble, DoubleDouble)>;
 
 // The part of the limits that the joint leaves free between two times; empty if there is almost no
@@ -96,7 +97,8 @@ std::optional<MotionLimits> roomBeside(const PeaksBetween& joint, double from, d
   return MotionLimits{0.0, speed, acceleration, acceleration, jerk};
 }
 
-// Changes the part that is taken up, within the time that this takes; empty if there is no room.
+// The motion that changes the part of the backlash that is taken up. It keeps the limits that the
+// joint leaves free until the motion ends; empty if there is no room.
 std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const MotionState& from,
                               std::int64_t to, const MotionLimits& limits) {
   double until = time_s + 1e-6;
@@ -117,7 +119,7 @@ class TakeUps {
 
   std::int64_t wanted(const Turn& turn) const { return turn.sign > 0.0 ? backlash_ : 0; }
   MotionState stateAt(const Turn& turn) const { return last_.stateAt(nanoseconds(turn.time_s)); }
-  /// Whether it rests at the position that the previous reversal asked for.
+  /// Whether the backlash rests at the position that the previous reversal asked for.
   bool restsAt(std::int64_t slack, const Turn& turn) const {
     const MotionState state = stateAt(turn);
     return state.velocity == 0.0 &&
@@ -152,7 +154,7 @@ class TakeUps {
   std::optional<double> no_room_;
 };
 
-// Rests before its start too.
+// The backlash rests before the start, too.
 void append(std::vector<Piece>& pieces, DoubleDouble& time, const Profile& taken) {
   const DoubleDouble start = secondsOf(taken.startNs());
   if (const DoubleDouble rest = start - time; rest.hi > kNegligibleTime) {
@@ -188,9 +190,9 @@ MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
 // ---- joining ----
 
 struct MotorTail::Plan {
-  std::vector<Turn> turns;      // of the tail alone, after its beginning
-  std::size_t moves_after = 0;  // pieces up to the first reversal
-  // for each reversal: whether the motion for the previous one had ended
+  std::vector<Turn> turns;      // the turns of the tail alone, after its beginning
+  std::size_t moves_after = 0;  // the number of pieces up to the first reversal
+  // For each reversal: whether the motion for the previous one had ended.
   std::vector<bool> from_rest;
   PeakTree peaks;
 
@@ -198,7 +200,7 @@ struct MotorTail::Plan {
     Turns all(joint.startPosition());
     for (std::size_t i = 0; i < joint.pieceCount(); ++i) {
       giveWayAt(i);
-      all.take(joint.piece(i), joint.pieceStart(i).value());
+      all.add(joint.piece(i), joint.pieceStart(i).value());
       if (all.found().empty()) moves_after = i + 1;
     }
     turns = all.found();
@@ -232,7 +234,7 @@ MotorTail::~MotorTail() = default;
 
 namespace {
 
-// Joining a motion to a tail examines no more than this.
+// Joining a motion to a tail examines no more than these.
 constexpr std::size_t kMostPieces = 1000;
 constexpr std::size_t kMostTurns = 64;
 
@@ -252,7 +254,7 @@ class MotorSections {
     if (left.hi > 0.0) sections_.add(Piece{left, joint_->endPosition() + slack_});
     time_ = until;
   }
-  void take(const Profile& taken) {
+  void add(const Profile& taken) {
     if (taken.pieceCount() == 0) return;
     const DoubleDouble start = secondsOf(taken.startNs());
     rest(start);
@@ -264,7 +266,7 @@ class MotorSections {
   }
   void add(Excerpt tail) { sections_.add(std::move(tail)); }
   DoubleDouble time() const { return time_; }
-  Sections take() { return std::move(sections_); }
+  Sections release() { return std::move(sections_); }
 
  private:
   static std::vector<Piece> asPieces(const Profile& profile) {
@@ -285,10 +287,10 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
                                            const std::shared_ptr<const Profile>& joint,
                                            DoubleDouble begin, double slack) const {
   const double later = begin.value();
-  // The turns from the start on, until they are those of the tail.
+  // Finds the turns from the start on, until they are those of the tail.
   Turns all(joint->startPosition());
   const std::size_t head = joint->pieceAt(begin);
-  for (std::size_t i = 0; i < head; ++i) all.take(joint->piece(i), joint->pieceStart(i).value());
+  for (std::size_t i = 0; i < head; ++i) all.add(joint->piece(i), joint->pieceStart(i).value());
   Turns tail(joint_.startPosition());
   const std::size_t first_move = plan_->moves_after;
   const std::size_t looked_at = std::min(joint_.pieceCount(), kMostPieces + first_move);
@@ -298,8 +300,8 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
     if (i > kMostPieces && i < first_move) i = first_move;
     if (i >= looked_at) break;
     const double start = joint_.pieceStart(i).value();
-    tail.take(joint_.piece(i), start);
-    all.take(joint_.piece(i), start + later);
+    tail.add(joint_.piece(i), start);
+    all.add(joint_.piece(i), start + later);
     coincide = all.coincideWith(tail, later);
   }
   if (!coincide && looked_at < joint_.pieceCount()) return std::nullopt;
@@ -331,7 +333,7 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
     }
     const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
     if (const auto taken = take_ups.at(turns[i], next)) {
-      sections.take(*taken);
+      sections.add(*taken);
       const double from = static_cast<double>(taken->startNs()) * 1e-9;
       joined.fresh.push_back({from, from + taken->duration().value()});
     }
@@ -349,7 +351,7 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
   } else {
     sections.rest(std::max(sections.time(), joint->duration()));
   }
-  joined.profile = Profile(0, sections.take());
+  joined.profile = Profile(0, sections.release());
   return joined;
 }
 
@@ -358,13 +360,13 @@ std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::i
   const double most = static_cast<double>(backlash);
   if (backlash == 0) return 0.0;
   if (motor.pieceCount() == 0) return std::nullopt;
-  // Backwards, from turn to turn, until the motor has come over the whole backlash: what was before
-  // that doesn't matter.
+  // Goes backwards from turn to turn until the motor has come over the whole backlash: what was
+  // before that doesn't matter.
   const DoubleDouble time = secondsOf(std::max<std::int64_t>(0, time_ns - motor.startNs()));
   std::vector<double> turns{motor.stateAt(time_ns).position.value()};
   double lowest = turns.front();
   double highest = turns.front();
-  const auto take = [&](DoubleDouble position) {
+  const auto include = [&](DoubleDouble position) {
     turns.push_back(position.value());
     lowest = std::min(lowest, turns.back());
     highest = std::max(highest, turns.back());
@@ -376,8 +378,8 @@ std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::i
     const double until = std::min((time - motor.pieceStart(index)).value(), piece.duration.value());
     std::vector<double> own;
     for (double t = piece.firstTurn(0.0); t < until; t = piece.firstTurn(t)) own.push_back(t);
-    for (auto turn = own.rbegin(); turn != own.rend(); ++turn) take(piece.positionAt(*turn));
-    take(piece.p0);
+    for (auto turn = own.rbegin(); turn != own.rend(); ++turn) include(piece.positionAt(*turn));
+    include(piece.p0);
     if (index == 0) break;
   }
   if (highest - lowest < most) return std::nullopt;

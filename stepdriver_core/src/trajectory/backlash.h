@@ -10,11 +10,12 @@
 
 namespace stepdriver::motion {
 
-/// The motion of a motor whose joint behind a backlash makes a given motion.
+/// A motor's motion that lets the joint behind a backlash make a given motion.
 struct MotorPlan {
   Profile profile;
-  /// [s] after the start: the reversal after which the joint has so much speed, acceleration or
-  /// jerk that the limits leave no room to take up the backlash. The profile is then the joint's.
+  /// [s] The time after the start of a reversal after which the limits leave no room to take up the
+  /// backlash, because the joint has so much speed, acceleration or jerk. The profile is then the
+  /// joint's.
   std::optional<double> no_room;
 };
 
@@ -26,8 +27,8 @@ struct MotorPlan {
 ///
 /// @param joint [microsteps] from its own start on. The motor's motion begins at the same time. It
 ///   ends at the same time or later, when the backlash is taken up.
-/// @param slack [microsteps] part of the backlash that is taken up at the start: from 0 to all.
-/// @param limits of the motor. The deceleration is ignored, because a motor that speeds up on one
+/// @param slack [microsteps] the part of the backlash that is taken up at the start: from 0 to all.
+/// @param limits the motor's. The deceleration is ignored, because a motor that speeds up on one
 ///   side of the backlash slows down on the other.
 MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
                     const MotionLimits& limits);
@@ -39,7 +40,7 @@ std::optional<double> slackAt(const Profile& motor, std::int64_t time_ns, std::i
 /// A motor's plan for a joint's motion whose first part was unknown when the rest was planned.
 struct JoinedMotor {
   Profile profile;
-  /// [s] after the start: parts of the profile that weren't planned in advance. The first one is
+  /// A part of the profile that wasn't planned in advance, in [s] after the start. The first one is
   /// everything up to the tail.
   struct Stretch {
     double from;
@@ -49,12 +50,12 @@ struct JoinedMotor {
   std::optional<double> no_room;  ///< as in MotorPlan
 };
 
-/// A motor's motion for the tail of a joint's motion, planned in advance: as planMotor() from the
-/// first reversal on before which the backlash was completely taken up or completely free.
-/// Immutable.
+/// A motor's motion for the tail of a joint's motion, planned in advance as planMotor() would plan
+/// it. It begins at the first reversal at which the backlash is certainly taken up completely or
+/// not at all. Immutable.
 class MotorTail {
  public:
-  /// @param joint the tail's, from its own beginning on; outlives this.
+  /// @param joint the tail of the joint's motion, from its own beginning on. It outlives this.
   MotorTail(const Profile& joint, std::int64_t backlash, const MotionLimits& limits);
   ~MotorTail();
   MotorTail(const MotorTail&) = delete;
@@ -62,7 +63,7 @@ class MotorTail {
 
   /// The motor's motion, as if the backlash were already taken up when it first moves.
   const Profile& profile() const { return motor_; }
-  /// As in MotorPlan, after the tail's beginning; if set, nothing can be joined.
+  /// As in MotorPlan, in the time after the tail's beginning. If it is set, nothing can be joined.
   std::optional<double> noRoom() const { return no_room_; }
 
   /// The plan for a head and the tail. It takes up the backlash from the start on until the result
@@ -70,7 +71,7 @@ class MotorTail {
   ///
   /// @param own the owner of this, which the profile shares.
   /// @param joint the joint's whole motion, with the tail from `begin` [s] on.
-  /// @param slack as planMotor().
+  /// @param slack as for planMotor().
   /// @return empty if the two don't coincide within a bounded number of reversals and pieces.
   std::optional<JoinedMotor> join(const std::shared_ptr<const MotorTail>& own,
                                   const std::shared_ptr<const Profile>& joint, DoubleDouble begin,

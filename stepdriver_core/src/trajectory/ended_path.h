@@ -5,10 +5,10 @@
 
 namespace stepdriver::motion {
 
-/// A path that an axis followed with others, for those who append to it too late.
+/// A path of several axes that has ended; a request to append to it comes too late.
 struct EndedPath {
   std::uint64_t move = 0;  ///< the number of the axis's move along it
-  std::string message;     ///< of that move's MoveResult
+  std::string message;     ///< the message of that move's MoveResult
 };
 
 /// "it has ended: x stands at 0.01 m, not at 0.02 m: the max endstop was met"

@@ -13,7 +13,7 @@ namespace {
 constexpr double kGentlerSlope = 0.9;
 constexpr int kSlopeTries = 20;
 
-// The steepest fall of the rate that a motor allows at a place [1/s].
+// [1/s] The steepest fall of the rate that a motor allows at a place.
 double steepestAt(const LimitedCurve& curve, DoubleDouble place, double rate) {
   const MotionState state = curve.curve->stateAt(splitNanoseconds(place).whole);
   const double speed = std::abs(state.velocity);
@@ -22,7 +22,7 @@ double steepestAt(const LimitedCurve& curve, DoubleDouble place, double rate) {
   return kSteepestSlope * speed <= room ? kSteepestSlope : std::max(room, 0.0) / speed;
 }
 
-// How the rate falls in a slice, to a lower one at most.
+// How the rate falls in a slice, at most to a lower rate.
 struct Fall {
   DoubleDouble from;
   double to = 0.0;
@@ -36,7 +36,7 @@ struct Fall {
   }
 };
 
-// That all motors allow in the whole slice.
+// The steepest slope that all motors allow in the whole slice.
 double steepestSlope(const std::vector<LimitedCurve>& curves, DoubleDouble place,
                      const Fall& fall) {
   double slope = kSteepestSlope;

@@ -12,9 +12,9 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kNoWay = 1e-12;  // s
+constexpr double kNoWay = 1e-12;  // [s]
 
-// Ends the current slope without leaving the rates from 0 to 1.
+// The motion that ends the current slope without leaving the rates from 0 to 1.
 void level(Phases& phases, double jerk) {
   const double slope = phases.a().value();
   const double rate = phases.v().value();

@@ -15,7 +15,8 @@ constexpr double kSteepestJerk = kSteepestSlope * kSteepestSlope;
 /// The limits for changes of the rate along a curve.
 struct FeedRateLimits {
   double slope = 0.0;  ///< [1/s]
-  double jerk = 0.0;   ///< [1/s^2] of the slope; 0: no limit, the slope may jump
+  /// [1/s^2] the limit for the change of the slope; 0: no limit, the slope may jump.
+  double jerk = 0.0;
 };
 
 /// The path s(t) along a curve, in seconds of the curve, for composeAlong(): it keeps the current

@@ -9,7 +9,7 @@
 namespace stepdriver::motion {
 namespace {
 
-// Velocity and acceleration at a knot.
+// The velocity and the acceleration at a knot.
 struct Derivatives {
   double velocity = 0.0;
   double acceleration = 0.0;
@@ -40,7 +40,7 @@ Derivatives operator-(const Derivatives& a, const Derivatives& b) {
   return {a.velocity - b.velocity, a.acceleration - b.acceleration};
 }
 
-// The matrices below are positive definite.
+// All matrices below are positive definite.
 Matrix inverse(const Matrix& m) {
   const double determinant = m.vv * m.aa - m.va * m.av;
   return {m.aa / determinant, -m.va / determinant, -m.av / determinant, m.vv / determinant};
@@ -90,13 +90,13 @@ Condition continuousJerk(const Span& left, const Span& right) {
   return condition;
 }
 
-// The knots of the curve: the start of the motion and the waypoints.
+// The knots of the curve are the start of the motion and the waypoints.
 class KnotSequence {
  public:
   KnotSequence(const MotionState& from, const std::vector<Waypoint>& waypoints, std::size_t first)
       : from_(from), waypoints_(waypoints), first_(first) {}
 
-  // Of the segment that ends at a waypoint.
+  // The duration and the way of the segment that ends at a waypoint.
   Span spanTo(std::size_t index) const {
     const Waypoint& end = waypoints_[index];
     if (index == first_) {
@@ -131,7 +131,7 @@ std::vector<Waypoint> interpolate(const MotionState& from, std::vector<Waypoint>
   const bool complete = std::all_of(waypoints.begin(), waypoints.end(),
                                     [](const Waypoint& each) { return each.velocity.has_value(); });
   if (complete) return waypoints;
-  // The curve leads there: planSpline().
+  // The curve of planSpline() leads there.
   Waypoint& last = waypoints.back();
   if (!last.may_rest) last.position = static_cast<double>(restingCount(last.position));
   const std::size_t first = waypoints.size() > 1 && waypoints.front().time_ns == 0 ? 1 : 0;

@@ -11,14 +11,15 @@
 namespace stepdriver::motion {
 namespace {
 
-// Of the jerk of the rate that a motor allows if nothing else moves it, the steepest fall first.
+// The jerks to try, the steepest fall first, as parts of the jerk of the rate that a motor would
+// allow if nothing else moved it.
 constexpr std::array<double, 10> kJerks = {-1.0,  -0.6, -0.35, -0.2, -0.1,
                                            -0.05, 0.0,  0.1,   0.3,  0.9};
-constexpr std::array<double, 3> kEnds = {0.9, 0.5, 0.25};  // the same, to end a slope
-constexpr double kNoSlope = 1e-9;                          // 1/s
+constexpr std::array<double, 3> kEnds = {0.9, 0.5, 0.25};  // the parts to try when a slope is ended
+constexpr double kNoSlope = 1e-9;                          // [1/s]
 constexpr int kMostWithoutGain = 4;                        // slices
 
-// Where the path is, its rate, and the slope of that [1/s].
+// The position on the path, its rate, and the slope of the rate [1/s].
 struct RateState {
   DoubleDouble place;
   DoubleDouble rate;
@@ -64,7 +65,7 @@ class JerkLimitedFeedDeceleration {
   }
 
  private:
-  // The slope ends exactly at the target.
+  // A piece that ends the slope exactly at the target.
   std::optional<Piece> levelAtTarget(const RateState& state, double sooner_than) const {
     if (!(state.slope < -kNoSlope)) return std::nullopt;
     const DoubleDouble fall = state.rate - DoubleDouble(target_);
@@ -74,7 +75,8 @@ class JerkLimitedFeedDeceleration {
     return keeps(piece) ? std::optional(piece) : std::nullopt;
   }
 
-  // The slice in which the rate falls the most; if nothing is left to choose, what ends the slope.
+  // The slice in which the rate falls the most. If no slice is left to choose, it is the piece that
+  // ends the slope.
   std::optional<Piece> steepest(const RateState& state) {
     const double jerk = highestJerk(state.place);
     for (std::size_t i = latest_ > 0 ? latest_ - 1 : 0; i < kJerks.size(); ++i) {
@@ -103,7 +105,7 @@ class JerkLimitedFeedDeceleration {
     return std::nullopt;
   }
 
-  // [1/s^2] Of the rate.
+  // [1/s^2] The highest jerk of the rate that the motors allow at a place.
   double highestJerk(DoubleDouble place) const {
     double highest = kSteepestJerk;
     for (const LimitedCurve& curve : courses_) {
@@ -123,7 +125,7 @@ class JerkLimitedFeedDeceleration {
   double target_;
   double slice_;
   DoubleDouble end_;
-  std::size_t latest_ = 0;  // of kJerks
+  std::size_t latest_ = 0;  // the index in kJerks of the last slice
   std::optional<Piece> end_of_slope_;
 };
 

@@ -8,14 +8,14 @@
 
 namespace stepdriver::motion {
 
-/// The same as planFeedDeceleration() if motors have jerk limits: the slope of the rate has no
-/// jump, and its jerk is constant during each slice.
+/// The same as planFeedDeceleration() for motors with jerk limits: the slope of the rate never
+/// jumps, and its jerk is constant during each slice.
 ///
-/// The slope has to end by the time at which the lower rate is reached. So in each slice the rate
-/// falls more and more steeply, as far as all motors keep to their limits, and as after it the
-/// slope could still be ended within them: then the axes could continue at that rate, which needs
-/// less of each limit than a higher one. Of the slices at whose end the slope can be ended exactly
-/// at the lower rate, the one is taken with which that is reached first.
+/// The slope has to be 0 when the lower rate is reached. In each slice the rate therefore falls
+/// more and more steeply, as long as all motors keep to their limits and the slope can still be
+/// ended within them afterwards. The axes could then continue at the rate that is reached, which
+/// needs less of each limit than a higher one. Several slices may have an end from which the slope
+/// can be ended exactly at the lower rate; the one that reaches this rate first is used.
 ///
 /// @param from the current position [s], rate and slope of the rate [1/s]
 /// @return nothing also if the rate is rising.

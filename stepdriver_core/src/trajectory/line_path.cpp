@@ -21,7 +21,8 @@ namespace stepdriver::motion {
 
 namespace {
 
-// [s] The search for a speed tries motions that are longer, but not too long to be planned.
+// [s] The search for a speed also tries motions that are longer than requested, but short enough to
+// be planned.
 constexpr double kLongestDuration = Profile::kLongest / 4.0;
 
 }  // namespace
@@ -159,8 +160,8 @@ Profile LinePath::plan(std::int64_t at, const MotionState& from, double speed_ov
   const AccelerationRampDown ramp_down(at, from, limits_, stop_limits_.jerk);
   Plan plan = ramp_down.followedBy(planMove(ramp_down.endNs(), ramp_down.end(), length_, limits));
   if (plan.overshoot <= kNoStep) return plan.profile;
-  // A stop may also speed up, to rest on a whole step, or leave too little room for a lower jerk.
-  // What it has begun can end within its own limits.
+  // A stop may also speed up, to rest on a whole step, or leave too little room for a lower jerk. A
+  // motion that such a stop has begun can end within the limits of stops.
   MotionLimits as_stop = stop_limits_;
   as_stop.max_speed = limits.max_speed;
   Plan kept = planMove(at, from, length_, as_stop);

@@ -13,18 +13,19 @@ namespace stepdriver::motion {
 /// the axis that makes the most of them.
 class LinePath : public SharedPath {
  public:
-  /// @param starts at rest; the backlash is taken up.
-  /// @param targets [microsteps] of each joint, see PathAxis::restAt().
-  /// @param velocity along the path, see motion::LineRequest; 0: as fast as the limits allow.
-  /// @param duration [s] of the line; 0: determined by the velocity.
+  /// @param starts the axes are at rest, and their backlash is taken up.
+  /// @param targets [microsteps] those of the joints, see PathAxis::restAt().
+  /// @param velocity the velocity along the path, see motion::LineRequest; 0: as fast as the limits
+  ///   allow.
+  /// @param duration [s] the duration of the line; 0: the velocity determines it.
   /// @throw Refused if the limits of the axes don't allow that velocity, or that duration.
   LinePath(std::vector<PathAxis> axes, const std::vector<PathStart>& starts,
            const std::vector<double>& targets, double velocity, double duration);
 
-  /// [s] From rest to rest, as fast as the limits allow.
+  /// [s] The duration from rest to rest, as fast as the limits allow.
   double shortestDuration() const;
 
-  /// @return whether it was planned for these axes from these positions.
+  /// Whether the line was planned for these axes from these positions.
   bool isOf(const std::vector<PathAxis>& axes, const std::vector<PathStart>& starts) const;
 
   /// @throw Refused if an axis isn't at rest at the beginning of the line.
@@ -37,7 +38,8 @@ class LinePath : public SharedPath {
 
  private:
   MotionLimits tightest(MotionLimits PathAxis::*limits) const;
-  /// Linear if a linear axis moves: then the velocity of the line is that of the linear axes.
+  /// The kind is linear if a linear axis moves: the velocity of the line is then that of the linear
+  /// axes.
   config::Kind kindOfVelocity() const;
   double pathSpeed(double velocity) const;
   double checkedSpeed(double velocity) const;
@@ -46,12 +48,12 @@ class LinePath : public SharedPath {
   double scale(std::size_t member) const;
 
   std::vector<PathAxis> axes_;
-  std::vector<DoubleDouble> origins_;  // microsteps of the motor
+  std::vector<DoubleDouble> origins_;  // [microsteps] the positions of the motors
   std::vector<DoubleDouble> ways_;
-  std::int64_t length_ = 0;   // of the path: the longest distance, plus up to a microstep
-  MotionLimits limits_;       // that the axes allow
+  std::int64_t length_ = 0;   // the longest distance of an axis, plus up to a microstep
+  MotionLimits limits_;       // those along the path that the axes allow
   MotionLimits stop_limits_;  // the same, for stops
-  double speed_ = 0.0;        // requested speed, at a speed override of 1
+  double speed_ = 0.0;        // the requested one, at a speed override of 1
 };
 
 }  // namespace stepdriver::motion

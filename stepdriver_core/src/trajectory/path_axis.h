@@ -18,23 +18,24 @@ namespace stepdriver::motion {
 struct PathAxis {
   std::string name;  ///< refusals begin with it
   config::Kind kind = config::Kind::kLinear;
-  /// It shares motors, and may come to rest between its own counts.
+  /// The axis shares motors, and may come to rest between its own counts.
   bool shares_motors = false;
-  int microsteps = 1;           ///< of a full step
+  int microsteps = 1;           ///< microsteps in a full step
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] the position at count 0
   bool continuous = false;      ///< see config::AxisConfig
-  /// [unit] Soft limits.
+  /// [unit] The soft limits.
   std::optional<double> min_position;
   std::optional<double> max_position;
   config::LimitSource min_position_source = config::LimitSource::kConfiguration;
   config::LimitSource max_position_source = config::LimitSource::kConfiguration;
   double configured_backlash = 0.0;  ///< [unit]
   std::int64_t backlash = 0;         ///< [microsteps]
-  /// [microsteps] For motions that begin now; the maximum speed is without the override.
+  /// [microsteps] The limits for motions that begin now. The maximum speed doesn't include the
+  /// speed override.
   MotionLimits limits;
   config::LimitSource max_speed_source = config::LimitSource::kConfiguration;
-  /// [microsteps] For every stop, as configured, regardless of `limits`.
+  /// [microsteps] The configured limits, which apply to every stop regardless of `limits`.
   MotionLimits stop_limits;
 
   bool operator==(const PathAxis& other) const;
@@ -42,34 +43,37 @@ struct PathAxis {
 
   double positionOf(double count) const { return origin + count / steps_per_unit; }
   double countOf(double position) const { return (position - origin) * steps_per_unit; }
-  /// [unit] The whole turns to add to a position so that it is as near as possible to another one;
-  /// 0 if the axis isn't continuous, or the position is too far away to be counted.
+  /// [unit] The whole turns that bring a position as near as possible to another one if they are
+  /// added to it. They are 0 if the axis isn't continuous, or if the position is too far away to be
+  /// counted.
   double turnsTowards(double other, double position) const {
     if (!continuous || isTooFar(position)) return 0.0;
     return config::kTurn * std::round((other - position) / config::kTurn);
   }
-  /// [microsteps] Where a motion ends that is to bring it to a position.
+  /// [microsteps] The place at which a motion ends that is to bring the axis to a position.
   double restAt(double count) const {
     return shares_motors ? count : static_cast<double>(restingCount(count));
   }
   /// [microsteps/s^2] The larger of acceleration and deceleration.
   double mostAcceleration() const;
 
-  /// A value that was asked for or configured: "0.1 m", "0.1 rad/s".
+  /// The text of a value that was requested or configured: "0.1 m", "0.1 rad/s".
   std::string show(double value, const char* per = "") const;
-  /// Where the axis stands or comes to rest: "0.1 m".
+  /// The text of a position at which the axis stands or comes to rest: "0.1 m".
   std::string showPlace(double position) const;
-  /// A limit with its source: "0.1 m, from robot_description".
+  /// The text of a limit with its source: "0.1 m, from robot_description".
   std::string showLimit(double value, config::LimitSource source, const char* per = "") const;
-  /// @throw Refused always: "x: why".
+  /// Refuses with the name of the axis before the reason: "x: why". @throw Refused always.
   [[noreturn]] void refuse(const std::string& why) const;
-  /// @param position [unit] @param what "the position"
-  /// @return empty if the axis may be there; it may not if that is beyond a soft limit, or too many
-  ///   steps away.
+  /// Why the axis may not be at a position: it is beyond a soft limit, or too many steps away.
+  ///
+  /// @param position [unit]
+  /// @param what the name of the position in the text: "the position"
+  /// @return empty if the axis may be there.
   std::string whyBeyondLimits(double position, const std::string& what) const;
-  /// @throw Refused if whyBeyondLimits() says why.
+  /// @throw Refused if whyBeyondLimits() returns a reason.
   void refuseBeyondLimits(double position, const std::string& what) const;
-  /// @param what returns the text: called only if it is refused
+  /// @param what returns the text; it is called only for a refusal.
   template <typename What>
   std::enable_if_t<std::is_invocable_v<What>> refuseBeyondLimits(double position,
                                                                  const What& what) const {
@@ -79,11 +83,11 @@ struct PathAxis {
   }
 
  private:
-  // Longest distance of one move [microsteps]: doubles represent every count and half count on it
-  // exactly.
+  // [microsteps] The longest distance of one move: up to it, doubles represent every count and half
+  // count exactly.
   static constexpr double kFarthest = 1099511627776.0;  // 2^40
 
-  // Half a step of tolerance: a position that rounds to the limit is at the limit.
+  // The tolerance is half a step: a position that rounds to the limit is at the limit.
   bool isBelow(double position) const {
     return min_position && position < *min_position - 0.5 / steps_per_unit;
   }
@@ -97,7 +101,7 @@ struct PathAxis {
 struct PathStart {
   MotionState motor;   ///< [microsteps]
   double slack = 0.0;  ///< [microsteps] the part of the backlash that is taken up
-  bool moves = false;  ///< false: it is at rest
+  bool moves = false;  ///< whether the axis is moving
 };
 
 }  // namespace stepdriver::motion

@@ -16,7 +16,7 @@
 namespace stepdriver::motion {
 namespace {
 
-// The rest of the limits is left for the backlash.
+// The plan leaves the rest of the limits to the backlash.
 constexpr double kShareWithBacklash = 0.8;
 
 double shareOf(const PathAxis& axis) { return axis.backlash > 0 ? kShareWithBacklash : 1.0; }
@@ -75,18 +75,19 @@ void requireRange(const Path& path, const std::vector<PathAxis>& axes,
   }
 }
 
-// [microsteps] By how much a position may be off that was calculated in doubles.
+// [microsteps] By how much a calculation in doubles may change a position.
 double roundingOf(double count) {
   return 4.0 * std::numeric_limits<double>::epsilon() * std::abs(count);
 }
 
-// [s] How long an axis takes to move by a part of a microstep from rest to rest: on a quintic,
+// [s] The time that an axis needs to move by a part of a microstep from rest to rest: on a quintic,
 // which has a speed of 1.875 way/T, an acceleration of 5.77 way/T^2 and a jerk of 60 way/T^3, or on
 // a cubic, which has a speed of 1.5 way/T and an acceleration of 6 way/T^2. A part of the limits is
-// left for the backlash. A very short way takes longer: a rounded position may add a thousandth of
-// the limits, and the rounded time of a point after a hundred years half a percent of the duration.
+// left for the backlash. A very short way takes longer, because a rounded position may add a
+// thousandth of the limits, and the rounded time of a point after a hundred years half a percent of
+// the duration.
 double restTime(double way, const PathAxis& axis, double count, bool smooth) {
-  constexpr double kShortest = 1e-4;      // s
+  constexpr double kShortest = 1e-4;      // [s]
   constexpr double kMostRounding = 1e-3;  // as a part of a limit
   const MotionLimits& limits = axis.limits;
   way = std::max(way, roundingOf(count) / kMostRounding);
@@ -115,19 +116,19 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
   return rest;
 }
 
-// The begin of the first segment, and the way to it from the place of the axes at rest.
+// The begin of the first segment, and the way to it from the place at which the axes rest.
 struct BeginOfPath {
   std::vector<double> rest;  // [unit]
   std::vector<double> place;
   std::int64_t delay_ns = 0;
 };
 
-// A line or a Bezier begins at the place of the axes. An arc begins at the commanded position, to
-// which its centre belongs: from half a microstep away it would be another arc.
+// A line or a Bezier begins at the place at which the axes rest. An arc begins at the commanded
+// position, to which its centre belongs: from half a microstep away it would be another arc.
 BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
                     const std::vector<PathOrigin>& origins, bool smooth) {
-  constexpr double kRounding = 1e-6;     // microsteps
-  constexpr double kBeforeStep = 0.499;  // microsteps: the way there makes no step
+  constexpr double kRounding = 1e-6;     // [microsteps]
+  constexpr double kBeforeStep = 0.499;  // [microsteps] a shorter way to it makes no step
   const bool arc = first.shape == PathSegment::Shape::kArcAround ||
                    first.shape == PathSegment::Shape::kArcThrough;
   BeginOfPath begin;
@@ -189,7 +190,7 @@ void setBlends(std::vector<CurveSegment>& segments, const Path& path, std::size_
   for (const std::size_t stop : stops) segments[stop].blend = 0.0;
 }
 
-// @param segments will have the `blend` of the plan if more follows.
+// @param segments their `blend` becomes that of the plan if more follows.
 PathTiming planAlong(std::vector<CurveSegment>& segments, const std::vector<double>& start,
                      const std::vector<PathAxis>& axes, bool more_follows) {
   const bool smooth = hasJerkLimit(axes);

@@ -15,13 +15,14 @@ using Shape = PathSegment::Shape;
 
 namespace {
 
-// [microsteps] of one of its axes: a shorter one is left out. What is left out adds up, because the
-// next one begins where the last one that counts ends.
+// [microsteps] A segment on which every axis moves less is left out. Ways that are left out add up,
+// because the next segment begins at the end of the last one that counts.
 constexpr double kShortestSegment = 1e-3;
-// [microsteps] The ends of an arc are the same if they differ by this in each axis of its plane:
-// senders calculate them. A path may also begin that far from its place, see planPath().
+// [microsteps] The ends of an arc are the same if they differ by less than this in each axis of its
+// plane, because senders calculate them. A path may also begin that far from its place, see
+// planPath().
 constexpr double kSameEnds = 2e-3;
-constexpr double kFullTurn = 2.0 * 3.14159265358979323846;  // rad
+constexpr double kFullTurn = 2.0 * 3.14159265358979323846;  // [rad]
 
 }  // namespace
 
@@ -166,14 +167,14 @@ bool PathReader::leadsNowhere(const PathSegment& given, const CurveSegment& segm
   if (segment.shape == CurveSegment::Shape::kArc) return false;
   double longest = 0.0;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
-    const auto take = [&](double position) {
+    const auto include = [&](double position) {
       const double way = std::abs(position - before_[i]) * axes_[i].steps_per_unit;
       longest = std::max(longest, way);
     };
-    take(segment.end[i]);
+    include(segment.end[i]);
     if (given.shape != Shape::kBezier) continue;
-    take(segment.control1[i]);
-    take(segment.control2[i]);
+    include(segment.control1[i]);
+    include(segment.control2[i]);
   }
   return longest < kShortestSegment;
 }

@@ -13,7 +13,7 @@ namespace stepdriver::motion {
 
 /// What all segments of a path have in common.
 struct PathFrame {
-  std::vector<std::string> names;  ///< of the axes
+  std::vector<std::string> names;  ///< the names of the axes
   std::vector<double> zero;        ///< [unit] positions of the segments count from here
   double velocity = 0.0;           ///< see PathRequest
   double tolerance = 0.0;

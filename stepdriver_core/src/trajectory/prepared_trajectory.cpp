@@ -23,7 +23,7 @@
 namespace stepdriver::motion {
 namespace {
 
-// The slowed trajectory may use the limits that the trajectory itself reaches.
+// The slowed trajectory may use the limits up to the values that the trajectory itself reaches.
 constexpr double kMore = 1.0 + kTrajectoryTolerance;
 // How many pieces may be planned again on joining if the prepared ones can't be used.
 constexpr std::size_t kFewPieces = 5000;
@@ -31,7 +31,7 @@ constexpr std::size_t kFewPieces = 5000;
 // velocity at the start stays: its acceleration falls by k instead of k^2, so each attempt about
 // halves the logarithm of what is missing.
 constexpr int kMostSlowdowns = 30;
-// [s] A trajectory isn't slowed down to more than this.
+// [s] A trajectory isn't made longer than this.
 constexpr double kLongestSlowed = Profile::kLongest / 4.0;
 // A motion that is slowed down leaves this part of the limits of an axis for its backlash.
 constexpr double kShareForBacklash = 0.2;
@@ -104,13 +104,13 @@ double shareOfJoint(const PathAxis& axis) {
 // already. A factor k divides velocities by k, accelerations by k^2 and jerks by k^3.
 double slowdownOf(const PathAxis& axis, const ProfilePeaks& peaks, const SplineJerk& jerk) {
   double factor = 1.0;
-  const auto take = [&](const Peak& peak, double most, double order) {
+  const auto include = [&](const Peak& peak, double most, double order) {
     const double excess = std::abs(peak.value) / (most * shareOfJoint(axis));
     if (excess > kMore) factor = std::max(factor, std::pow(excess, 1.0 / order));
   };
-  take(peaks.velocity, axis.limits.max_speed, 1.0);
-  take(peaks.acceleration, axis.mostAcceleration(), 2.0);
-  if (axis.limits.jerk > 0.0) take(jerk.jerk, axis.limits.jerk, 3.0);
+  include(peaks.velocity, axis.limits.max_speed, 1.0);
+  include(peaks.acceleration, axis.mostAcceleration(), 2.0);
+  if (axis.limits.jerk > 0.0) include(jerk.jerk, axis.limits.jerk, 3.0);
   return factor;
 }
 
@@ -126,7 +126,7 @@ std::string remedyText(double shortest, double wanted) {
                   at(time_s), axis.show(axis.configured_backlash)));
 }
 
-// At rest, a first point at time 0 gives the position that the trajectory assumes for the axis.
+// If the axis is at rest, a first point at time 0 says where the trajectory assumes it to be.
 void requireStart(const PathAxis& axis, const Waypoint& first, const PathStart& start) {
   const double count =
       static_cast<double>(restingCount(start.motor.position.value())) - start.slack;
@@ -273,20 +273,20 @@ std::vector<Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     giveWayAt(i);
     const TrajectoryPoint& point = source.points[i];
-    const auto take = [&](const std::vector<double>& numbers, const char* what) {
+    const auto read = [&](const std::vector<double>& numbers, const char* what) {
       return finiteOf(axis, member, i, numbers, what);
     };
     Waypoint& waypoint = waypoints[i];
     waypoint.time_ns = nanoseconds(source.slowdown * point.time);
-    const double position = take(point.positions, "positions");
+    const double position = read(point.positions, "positions");
     axis.refuseBeyondLimits(position, [&] { return pointText(i) + " at"; });
     waypoint.position = axis.countOf(position);
     if (!point.velocities.empty()) {
       waypoint.velocity =
-          take(point.velocities, "velocities") * axis.steps_per_unit / source.slowdown;
+          read(point.velocities, "velocities") * axis.steps_per_unit / source.slowdown;
     }
     if (!point.accelerations.empty()) {
-      waypoint.acceleration = take(point.accelerations, "accelerations") * axis.steps_per_unit /
+      waypoint.acceleration = read(point.accelerations, "accelerations") * axis.steps_per_unit /
                               (source.slowdown * source.slowdown);
     }
   }
@@ -392,7 +392,7 @@ std::vector<Piece> PreparedTrajectory::quickestTo(std::size_t member,
   } catch (const TooLong& error) {
     axis.refuse(error.what());
   }
-  // An axis that is there already waits for the others.
+  // An axis that is already there waits for the others.
   if (pieces.empty()) pieces.push_back({DoubleDouble(1e-9), from.position});
   return pieces;
 }

@@ -48,13 +48,11 @@ class PreparedTrajectory {
   double target(std::size_t member) const { return parts_[member].target; }
 
   /// The path from the current positions of the axes. If there is a backlash, it is taken up until
-  /// the result matches what was prepared, mostly at the first reversal.
+  /// the result matches what was prepared, mostly at the first reversal. A single point without
+  /// velocities is a straight line from rest to rest, in its time.
   ///
   /// @param prepared is shared by the path, and by all profiles along it.
   /// @param starts one for each axis, at the time at which the path begins.
-  ///
-  /// A single point without velocities is a straight line from rest to rest, in its time.
-  ///
   /// @throw Refused if an axis can't do its part from there; or if reversals follow each other so
   ///   closely that the backlash is never at rest, so that checking would take unbounded time.
   static std::shared_ptr<const SharedPath> join(
@@ -62,21 +60,21 @@ class PreparedTrajectory {
       const std::vector<PathStart>& starts);
 
  private:
-  // Everything that is known about one axis in advance. A motor tail points into the spline tail.
+  // Everything that is known about one axis in advance. A motor's tail refers to the spline's tail.
   struct Part {
-    std::vector<Waypoint> ends;    // the first waypoint, and the last
-    double target = 0.0;           // [microsteps] the last position as it was commanded
+    std::vector<Waypoint> ends;    // the first and the last waypoint
+    double target = 0.0;           // [microsteps] the commanded last position
     bool begins_at_start = false;  // the first of several points is at time 0
     std::unique_ptr<const SplineTail> spline;
     std::unique_ptr<const MotorTail> motor;  // only with a backlash
-    MotorBounds bounds;                      // reached by the tail
+    MotorBounds bounds;                      // what the tail needs
   };
 
-  // What a trajectory is made from.
+  // The points from which a trajectory is made.
   struct Source {
     const std::vector<TrajectoryPoint>& points;
     const std::vector<MotionState>& expected;
-    double slowdown = 1.0;  // the factor on the times
+    double slowdown = 1.0;  // the times of the points are multiplied by it
 
     double duration() const { return slowdown * points.back().time; }
   };
@@ -90,8 +88,8 @@ class PreparedTrajectory {
   std::shared_ptr<const SharedPath> joinAll(const std::shared_ptr<const PreparedTrajectory>& own,
                                             const std::vector<PathStart>& starts,
                                             bool at_rest) const;
-  /// @return the smallest factor that the limits allow, at least that of the source; empty: none
-  ///   does.
+  /// The smallest factor on the times that the limits allow, at least that of the source; empty if
+  /// the limits allow none.
   std::optional<double> slowdownFor(Source source) const;
   Part prepare(std::size_t member, const Source& source) const;
   void requirePoints(const std::vector<TrajectoryPoint>& points) const;
@@ -102,7 +100,7 @@ class PreparedTrajectory {
   Head headOf(std::size_t member, const PathStart& start) const;
   /// The fastest motion to rest at the last point.
   std::vector<Piece> quickestTo(std::size_t member, const PathStart& start) const;
-  /// Whether it has a single segment, which ends at rest.
+  /// Whether the trajectory has a single segment, which ends at rest.
   bool isOneRest() const;
   TrajectoryPath::Member joinMember(const std::shared_ptr<const PreparedTrajectory>& own,
                                     std::size_t member, const PathStart& start, const Head& given,
@@ -113,8 +111,8 @@ class PreparedTrajectory {
 
   std::vector<PathAxis> axes_;
   std::vector<Part> parts_;
-  bool lone_position_ = false;   // of its only point, only the positions count
-  bool has_velocities_ = false;  // at all points
+  bool lone_position_ = false;   // there is a single point, and only its positions count
+  bool has_velocities_ = false;  // all points have velocities
   bool allow_slower_ = false;
 };
 

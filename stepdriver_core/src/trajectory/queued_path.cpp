@@ -21,22 +21,22 @@ namespace stepdriver::motion {
 
 namespace {
 
-// Of the excess of a plan from a speed.
+// A plan from a speed may exceed its share of the limits by this part, which is rounding.
 constexpr double kNoExcessFromSpeed = 1e-9;
-// Of the maximum speed: the backlash is at rest. With a jerk limit it comes to rest gently, and
-// must not have an acceleration.
+// A backlash that is slower than this part of the maximum speed is at rest. With a jerk limit it
+// comes to rest gently, and must not have an acceleration.
 constexpr double kStill = 1e-3;
 constexpr double kStillGently = 1e-6;
-// [microsteps] A backlash at rest is so close to whole microsteps.
+// [microsteps] A backlash that is this close to whole microsteps is at rest.
 constexpr double kNearMicrostep = 1e-3;
-// If the axes can't slow down before a corner, its rounding begins later: the part of the segment
-// that is left for it is halved so often, and then it isn't rounded.
+// If the axes can't slow down before a corner, its rounding begins later. The part of the segment
+// that is left for it is halved this often; then the corner isn't rounded.
 constexpr int kCornerHalvings = 6;
 // [ns] Straight lines aren't divided closer to their end.
 constexpr std::int64_t kShortestPart = 100'000;
-// Starts that are tried before the end of the path.
+// The number of starts that are tried before the end of the path.
 constexpr int kMostStarts = 8;
-// Segments before and after a corner into which it may be rounded.
+// The number of segments before and after a corner into which it may be rounded.
 constexpr std::size_t kMostRounded = 33;
 
 void appendPieces(std::vector<Piece>& pieces, const Profile& profile) {
@@ -70,14 +70,14 @@ struct QueuedPath::Start {
   std::int64_t time_ns = 0;
   std::size_t segment = 0;
   TimingStart begin;
-  // At rest after the end of the path: the way from the microsteps of the axes to that end takes so
-  // long, and the path begins with the new segments.
+  // The path continues after the axes have come to rest at its end. The way from the microsteps of
+  // the axes to that end takes this long, and the path begins with the new segments.
   std::optional<double> from_rest;
-  bool on_straight = false;  // between two knots
+  bool on_straight = false;  // the start is between two knots
 };
 
 struct QueuedPath::Continuation {
-  std::vector<CurveSegment> segments;  // from that of the start on
+  std::vector<CurveSegment> segments;  // the segments from that of the start on
   PathTiming plan;
   std::vector<PathStart> states;
 };
@@ -157,8 +157,8 @@ QueuedPath::Start QueuedPath::atRest() const {
   return {end_ns, window_->segments.size(), {}, duration, false};
 }
 
-// The earliest ones first, but none of which a later one allows the same; the last one is certainly
-// possible.
+// The starts in the order in which they are tried, the earliest ones first. If a later one allows
+// the same, the earlier one is left out. The last one is certainly possible.
 std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t from_ns) const {
   const std::vector<PathWindow::Knot>& knots = window_->knots;
   std::vector<Start> starts;
@@ -200,7 +200,7 @@ std::vector<QueuedPath::Start> QueuedPath::startsFrom(std::int64_t from_ns) cons
   return starts;
 }
 
-// Empty if a backlash is being taken up there.
+// The state of the motion at a start; empty if a backlash is being taken up there.
 std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
                                                            const JointPlace& joint) const {
   const std::int64_t at_ns = start.time_ns - splitNanoseconds(motion_->origin()).whole;
@@ -246,7 +246,7 @@ void QueuedPath::adjust(Start& start, const PathPoint& planned,
   }
 }
 
-// The first segment whose corner at the end is rounded into this one, or this one.
+// The first segment whose corner at the end is rounded into this one; this one if there is none.
 std::size_t QueuedPath::firstRoundedInto(std::size_t segment) const {
   const std::vector<CurveSegment>& segments = window_->segments;
   std::size_t first = segment;
@@ -260,13 +260,13 @@ std::size_t QueuedPath::firstRoundedInto(std::size_t segment) const {
   return first;
 }
 
-// The segments from this one on, with the corners that are rounded at the start or before it as
-// they are. The others may be rounded again, after the start.
+// The segments from this one on. Corners that are rounded at the start or before it stay as they
+// are. The others may be rounded again, after the start.
 std::vector<CurveSegment> QueuedPath::aroundStart(const Start& start, std::size_t first) const {
   const std::vector<CurveSegment>& old = window_->segments;
   std::vector<CurveSegment> made(old.begin() + static_cast<std::ptrdiff_t>(first), old.end());
   double away = 0.0;
-  bool near = true;  // roundings may reach the start
+  bool near = true;  // whether roundings may still reach the start
   for (std::size_t i = start.segment; i < old.size(); ++i) {
     CurveSegment& segment = made[i - first];
     const bool line = segment.shape == CurveSegment::Shape::kLine;
@@ -283,7 +283,7 @@ std::vector<CurveSegment> QueuedPath::aroundStart(const Start& start, std::size_
   return made;
 }
 
-// Empty if the axes can't follow the rest of the path from there.
+// The motion along the rest of the path; empty if the axes can't follow it from there.
 std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
     Start start, const std::vector<CurveSegment>& added, bool more_follows,
     int most_halvings) const {
@@ -292,7 +292,8 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
   const bool smooth = hasJerkLimit(axes);
   const auto continuity = smooth ? Continuity::kCurvature : Continuity::kDirection;
   const std::size_t first = firstRoundedInto(start.segment);
-  const std::size_t before = start.segment - first;  // segments before that of the start
+  // The number of segments before that of the start.
+  const std::size_t before = start.segment - first;
   const std::vector<double>& from = first == 0 ? window_->start : old[first - 1].end;
   std::vector<CurveSegment> segments = aroundStart(start, first);
   const std::size_t corner = segments.size();  // the number of the segment after it
@@ -342,8 +343,8 @@ QueuedPath::JointPlace QueuedPath::jointAt(const Start& start, const PathPoint& 
   return joint;
 }
 
-// The motion so far, without what is passed, and from the start on the new one; null if there is no
-// room to take up a backlash.
+// The motion so far, without the part that is passed, and the new motion from the start on; null if
+// there is no room to take up a backlash.
 std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
                                                          const Continuation& continuation,
                                                          const std::vector<TrajectoryPoint>& points,
@@ -358,7 +359,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
     waypoints.reserve(points.size());
     for (const TrajectoryPoint& point : points) {
       const std::int64_t time_ns = nanoseconds(point.time);
-      if (time_ns == 0) continue;  // the start
+      if (time_ns == 0) continue;  // it is the start
       Waypoint& waypoint = waypoints.emplace_back();
       waypoint.time_ns = time_ns;
       waypoint.position = axis.countOf(point.positions[k]);
@@ -444,7 +445,7 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
   PathWindow window;
   window.frame = window_->frame;
   window.axes = window_->axes;
-  // What is passed.
+  // Leaves out the part that is passed.
   const auto first_kept =
       std::upper_bound(window_->knots.begin() + 1, window_->knots.end(), passed_ns,
                        [](std::int64_t time, const auto& knot) { return time < knot.time_ns; }) -

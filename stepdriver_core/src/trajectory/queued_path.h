@@ -16,9 +16,9 @@
 
 namespace stepdriver::motion {
 
-/// The segments that axes follow, without those that they have passed, and what is known about the
-/// motion along them. Positions are in the units of the axes, times in seconds or nanoseconds of
-/// the path since its begin.
+/// The segments that axes follow, except those that they have passed, and what is known about the
+/// motion along them. Positions are in the units of the axes, times in seconds or nanoseconds from
+/// the begin of the path.
 struct PathWindow {
   /// A place at which the motion is known.
   struct Knot {
@@ -36,29 +36,30 @@ struct PathWindow {
   PathFrame frame;
   std::vector<PathAxis> axes;
   std::vector<double> start;  ///< where the first segment begins
-  /// With a jerk limit, also those before them whose corners are rounded as far as the first one
-  /// ahead, and the `blend` of each is that of the plan.
+  /// With a jerk limit, the list begins with earlier segments whose corners are rounded as far as
+  /// the first one ahead, and the `blend` of each segment is that of the plan.
   std::vector<CurveSegment> segments;
   std::vector<Knot> knots;      ///< the last one is the end of the path
   std::int64_t settled_ns = 0;  ///< see motion::PathTiming
 
-  /// The end of the last segment; the start if none has made a step yet.
+  /// The end of the last segment; the start if no segment has made a step yet.
   const std::vector<double>& end() const { return segments.empty() ? start : segments.back().end; }
 };
 
-/// A path to which segments can be appended while axes follow it. Immutable: the longer path is
-/// another one. The motion up to some time ahead stays as it is; from there on, the rest of the old
-/// segments and the new ones are planned again, from the speed that the axes have there to rest at
-/// the new end. The corner at the former end is rounded if the axes can still slow down before it.
+/// A path to which segments can be appended while axes follow it. It is immutable: the longer path
+/// is another object. The motion up to some time ahead stays as it is. From there on, the rest of
+/// the old segments and the new ones are planned again, from the speed that the axes have there to
+/// rest at the new end. The corner at the former end is rounded if the axes can still slow down
+/// before it.
 ///
-/// The plan uses a thousandth less than the limits of the axes: what planning from a speed may miss
-/// by.
+/// The plan uses a thousandth less than the limits of the axes, because planning from a speed may
+/// exceed them by that much.
 class QueuedPath : public SharedPath {
  public:
   static constexpr double kShareOfLimits = 0.999;
 
-  /// @param motion along the window, from time 0 on.
-  /// @param more_follows it isn't complete: the axes wait at its end.
+  /// @param motion the motion along the window, from time 0 on.
+  /// @param more_follows the path isn't complete: the axes wait at its end.
   QueuedPath(const std::shared_ptr<const SharedPath>& motion,
              std::shared_ptr<const PathWindow> window, bool more_follows);
 
@@ -67,24 +68,24 @@ class QueuedPath : public SharedPath {
     std::shared_ptr<const QueuedPath> path;
     double same_from = 0.0;   ///< [s]
     double same_until = 0.0;  ///< [s]
-    bool moves_on = false;    ///< whether it leads beyond the end of this one
+    bool moves_on = false;    ///< whether the new path leads beyond the end of this one
   };
-  /// Takes time in proportion to the segments that are planned again: those between the point from
-  /// which the axes slow down to rest at the present end, and the new end. With a jerk limit, the
-  /// motion changes at a knot before that point at which the speed is highest or lowest, or rises.
+  /// Appends segments. It takes time in proportion to the segments that are planned again: those
+  /// between the point from which the axes slow down to rest at the present end, and the new end.
+  /// With a jerk limit, the motion changes at a knot before that point at which the speed is
+  /// highest or lowest, or rises.
   ///
-  /// @param segments may be empty, to tell that this is the end.
-  /// @param passed [s] a position that the axes have passed: what is before it is forgotten.
+  /// @param segments may be empty, which means that this is the end.
+  /// @param passed [s] a position that the axes have passed: what is before it is dropped.
   /// @param changeable [s] the first position from which the motion may change.
-  /// @throw Refused if it is complete, if too many segments would lie ahead, or if one of them
-  /// isn't
-  ///   possible, by its number among the new ones.
+  /// @throw Refused if the path is complete, if too many segments would lie ahead, or if one of
+  ///   them isn't possible. It is named by its number among the new ones.
   Longer extended(const std::vector<PathSegment>& segments, bool more_follows, double passed,
                   double changeable) const;
 
-  /// What lies ahead of a position [s].
+  /// The segments ahead of a position [s].
   PathAhead aheadOf(double position) const;
-  std::vector<double> targets() const;  ///< [microsteps] of each joint, its end
+  std::vector<double> targets() const;  ///< [microsteps] the end of each joint's motion
 
   MotionState begin() const override { return motion_->begin(); }
   MotionState restart(DoubleDouble position) const override { return motion_->restart(position); }
@@ -102,7 +103,7 @@ class QueuedPath : public SharedPath {
  private:
   struct Start;
   struct Continuation;
-  // Of all axes [unit, unit/s].
+  // The state of all axes [unit, unit/s].
   struct JointPlace {
     std::vector<double> position;
     std::vector<double> velocity;

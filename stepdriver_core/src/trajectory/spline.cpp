@@ -81,12 +81,13 @@ Piece cubicOf(const SplineSegment& segment) {
                segment.end.position, *segment.end.velocity);
 }
 
-// The motion of a segment with the smallest largest acceleration: it changes its velocity evenly up
-// to a velocity v, keeps that for a while, and changes it evenly to the one at its end.
+// The motion of a segment whose largest acceleration is the smallest possible one: its velocity
+// changes evenly to a velocity v, which it keeps for a while, and then changes evenly to the
+// velocity at the end.
 struct GentlestMotion {
-  double change = 0.0;    // s, until v
-  double velocity = 0.0;  // microsteps/s, v
-  double keep = 0.0;      // s
+  double change = 0.0;    // [s] the time until v is reached
+  double velocity = 0.0;  // [microsteps/s] v
+  double keep = 0.0;      // [s] how long v is kept
 };
 
 // Let c = p1 - p0 - (v0 + v1) T/2 be the way that a constant acceleration would miss, and
@@ -105,7 +106,7 @@ GentlestMotion gentlestMotion(const SplineSegment& segment, double most_speed) {
   if (x == 0.0) return {0.0, v0, time};
   const double change = std::clamp((time + (v1 - v0) / x) / 2.0, 0.0, time);
   const double peak = v0 + x * change;
-  // The velocities that the sender gave are as they are.
+  // The velocities that the sender gave aren't changed.
   const double limit = sign * std::max({most_speed, sign * v0, sign * v1});
   if (sign * peak <= sign * limit) return {change, peak, 0.0};
   const double before = limit - v0;
@@ -113,14 +114,14 @@ GentlestMotion gentlestMotion(const SplineSegment& segment, double most_speed) {
   const double least = (before * before + after * after) / (2.0 * (limit * time - way));
   const double up = before / least;
   const double down = after / least;
-  // Otherwise even the mean velocity is beyond the limit.
+  // Otherwise even the mean velocity would be beyond the limit.
   if (!(up >= 0.0 && down >= 0.0 && up + down <= time)) return {change, peak, 0.0};
   return {up, limit, time - up - down};
 }
 
 void appendGentlest(std::vector<Piece>& pieces, const SplineSegment& segment, double most_speed) {
-  // Of a segment: a shorter stretch is left out, which changes the accelerations of the others by
-  // less than four times this part.
+  // Relative to the duration of a segment: a shorter stretch is left out, which changes the
+  // accelerations of the others by less than four times this part.
   constexpr double kNothing = 1e-6;
   const GentlestMotion motion = gentlestMotion(segment, most_speed);
   const DoubleDouble duration = segment.duration();
@@ -147,8 +148,8 @@ void appendCubic(std::vector<Piece>& pieces, const SplineSegment& segment) {
   requireReach(reach(pieces.back()), segment.index);
 }
 
-// Replaces the curve of a segment, the pieces from an index on, by the first gentler one that keeps
-// to the limits. If none does, it stays.
+// Replaces the curve of a segment, which is the pieces from an index on, by the first gentler curve
+// that keeps to the limits. If none does, it stays.
 void makeGentler(std::vector<Piece>& pieces, std::size_t from, const SplineSegment& segment,
                  const SplineLimits& limits) {
   const double most = limits.gentler_beyond;
@@ -190,21 +191,21 @@ struct Ends {
   double end = 0.0;
 };
 
-Ends takeJerk(SplineJerk& worst, const SplineSegment& segment, const Piece* made = nullptr) {
+Ends includeJerk(SplineJerk& worst, const SplineSegment& segment, const Piece* made = nullptr) {
   const double start = static_cast<double>(segment.begin.time_ns) * 1e-9;
-  const auto take = [&](double jerk, double time_s) {
+  const auto include = [&](double jerk, double time_s) {
     if (std::abs(jerk) > std::abs(worst.jerk.value)) worst.jerk = {jerk, time_s};
   };
   if (segment.kind() == SegmentKind::kLine) return {};
   if (segment.kind() == SegmentKind::kCubic) {
     const DoublePiece piece(made != nullptr ? *made : cubicOf(segment));
-    take(piece.j, start);
+    include(piece.j, start);
     return {piece.a, piece.acceleration(piece.duration)};
   }
   const double duration = segment.duration().value();
   const Quintic curve = segment.quintic();
   const auto consider = [&](double u) {
-    take(curve.thirdDerivativeAt(u) / (duration * duration * duration), start + u * duration);
+    include(curve.thirdDerivativeAt(u) / (duration * duration * duration), start + u * duration);
   };
   consider(0.0);
   consider(1.0);
@@ -218,9 +219,9 @@ class JerkMeter {
  public:
   explicit JerkMeter(double acceleration_before) : before_(acceleration_before) {}
 
-  /// @param made the cubic of the segment, if it has been made.
-  void take(const SplineSegment& segment, const Piece* made = nullptr) {
-    const Ends ends = takeJerk(worst_, segment, made);
+  /// @param made the cubic of the segment, if it has been made already.
+  void add(const SplineSegment& segment, const Piece* made = nullptr) {
+    const Ends ends = includeJerk(worst_, segment, made);
     jumpTo(ends.begin, segment.begin.time_ns);
     before_ = ends.end;
   }
@@ -239,7 +240,7 @@ class JerkMeter {
 
 double accelerationAtBegin(const SplineSegment& segment) {
   SplineJerk ignored;
-  return takeJerk(ignored, segment).begin;
+  return includeJerk(ignored, segment).begin;
 }
 
 }  // namespace
@@ -261,8 +262,8 @@ SplineJerk splineJerk(const MotionState& from, const std::vector<Waypoint>& wayp
   requirePlannable(from, waypoints);
   const SplineSegments segments(waypoints);
   JerkMeter meter(from.acceleration);
-  meter.take(segments.first(from));
-  for (std::size_t i = 1; i < segments.size(); ++i) meter.take(segments.at(i));
+  meter.add(segments.first(from));
+  for (std::size_t i = 1; i < segments.size(); ++i) meter.add(segments.at(i));
   meter.jumpTo(0.0, waypoints.back().time_ns);
   return meter.worst();
 }
@@ -285,7 +286,7 @@ SplineTail::SplineTail(const std::vector<Waypoint>& waypoints, const SplineLimit
     segments.advance(segment);
     const std::size_t before = pieces.size();
     append(pieces, segment, limits);
-    meter.take(segment, pieces.size() == before + 1 ? &pieces.back() : nullptr);
+    meter.add(segment, pieces.size() == before + 1 ? &pieces.back() : nullptr);
   }
   meter.jumpTo(0.0, waypoints.back().time_ns);
   profile_.emplace(0, std::move(pieces));
@@ -307,9 +308,9 @@ std::vector<Piece> SplineTail::head(const MotionState& from) const {
 
 SplineJerk SplineTail::headJerk(const MotionState& from) const {
   JerkMeter meter(from.acceleration);
-  meter.take({{0, from.position, from.velocity, from.acceleration},
-              {first_.time_ns, first_.position, first_.velocity, first_.acceleration},
-              first_index_});
+  meter.add({{0, from.position, from.velocity, from.acceleration},
+             {first_.time_ns, first_.position, first_.velocity, first_.acceleration},
+             first_index_});
   meter.jumpTo(begin_acceleration_, first_.time_ns);
   return meter.worst();
 }

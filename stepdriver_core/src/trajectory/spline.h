@@ -18,21 +18,21 @@ struct Waypoint {
   double position = 0.0;               ///< [microsteps] within kFarthest of 0
   std::optional<double> velocity;      ///< [microsteps/s]
   std::optional<double> acceleration;  ///< [microsteps/s^2] counts only together with a velocity
-  bool may_rest = false;               ///< the motion may come to rest here, between two microsteps
+  bool may_rest = false;  ///< the motion may come to rest here, even between two microsteps
 };
 
-/// [microsteps] No waypoint is farther from 0, so that curves between waypoints stay within
-/// integers of 53 bits.
+/// [microsteps] The largest distance of a waypoint from 0. Curves between waypoints then stay
+/// within integers of 53 bits.
 constexpr double kFarthest = 140737488355328.0;  // 2^47
 
-/// [microsteps] The largest deviation of the cubics from their quintic segment.
+/// [microsteps] The largest deviation of the cubics from the quintic that they replace.
 constexpr double kQuinticError = 0.01;
 
 /// The part of a limit by which the acceleration of the cubics may exceed it, if that of their
 /// quintic doesn't.
 constexpr double kQuinticAccelerationError = 0.0025;
 
-/// What the curve of a trajectory should keep to, if its points allow it.
+/// The limits of the axis, which the curve of a trajectory keeps if its points allow that.
 struct SplineLimits {
   double acceleration = std::numeric_limits<double>::infinity();  ///< [microsteps/s^2]
   double speed = std::numeric_limits<double>::infinity();         ///< [microsteps/s]
@@ -108,25 +108,25 @@ class SplineTail {
   /// @throw as planSpline().
   explicit SplineTail(const std::vector<Waypoint>& waypoints, const SplineLimits& limits = {});
 
-  /// When the tail begins [s], after the trajectory's start. If there is only one segment, it ends
-  /// here.
+  /// [s] The time after the trajectory's start at which the tail begins. If there is only one
+  /// segment, it is the end of that segment.
   double beginS() const { return static_cast<double>(first_.time_ns) * 1e-9; }
   /// The motion of the tail, from its own beginning on; null if there is only one segment.
   const Profile* profile() const { return profile_ ? &*profile_ : nullptr; }
-  /// Its demands on a motor with a jerk limit, at times after its own beginning. Its end counts,
-  /// its beginning doesn't.
+  /// The demands of the tail on a motor with a jerk limit, at times after its own beginning. They
+  /// include its end, but not its beginning.
   const SplineJerk& jerk() const { return jerk_; }
 
   /// The first segment. @throw motion::Malformed as planSpline().
   std::vector<Piece> head(const MotionState& from) const;
-  /// The first segment's demands on such a motor, including its beginning and end.
+  /// The demands of the first segment on such a motor, including its beginning and end.
   SplineJerk headJerk(const MotionState& from) const;
 
  private:
   SplineLimits limits_;
   Waypoint first_;                   // the end of the first segment
-  std::size_t first_index_ = 0;      // of it
-  double begin_acceleration_ = 0.0;  // of the tail [microsteps/s^2]
+  std::size_t first_index_ = 0;      // the index of its end
+  double begin_acceleration_ = 0.0;  // [microsteps/s^2] at the beginning of the tail
   std::optional<Profile> profile_;
   SplineJerk jerk_;
 };

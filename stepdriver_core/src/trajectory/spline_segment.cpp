@@ -19,7 +19,7 @@ double Quintic::thirdDerivativeAt(double u) const {
   return 6.0 * c3.value() + u * (24.0 * c4.value() + u * 60.0 * c5.value());
 }
 
-// It is linear: largest at an end.
+// The derivative is linear, so it is largest at an end.
 double Quintic::largestFourthDerivative() const {
   const double begin = 24.0 * c4.value();
   return std::max(std::abs(begin), std::abs(begin + 120.0 * c5.value()));

@@ -36,7 +36,7 @@ enum class SegmentKind { kLine, kCubic, kQuintic };
 struct SplineSegment {
   SplineKnot begin;
   SplineKnot end;
-  std::size_t index = 0;  ///< of the waypoint at its end
+  std::size_t index = 0;  ///< the index of the waypoint at its end
 
   SegmentKind kind() const;
   DoubleDouble duration() const;  ///< [s]
@@ -55,14 +55,15 @@ class SplineSegments {
   SplineSegment first(const MotionState& from) const;
   /// @pre index > 0
   SplineSegment at(std::size_t index) const;
-  /// From a segment to the next one.
+  /// Makes the next segment from this one.
   void advance(SplineSegment& segment) const;
 
  private:
   SplineKnot knot(std::size_t waypoint) const;
 
   const std::vector<Waypoint>& waypoints_;
-  std::size_t skipped_;  // waypoints: one at time 0 has passed when the motion starts
+  // The number of waypoints at time 0, which have passed when the motion starts.
+  std::size_t skipped_;
 };
 
 }  // namespace stepdriver::motion

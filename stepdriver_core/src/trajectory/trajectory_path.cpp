@@ -15,16 +15,16 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kGentler = 0.8;
-constexpr int kTries = 60;             // down to a millionth of the steepest
-constexpr double kLastResort = 1e-6;   // of the steepest
-constexpr double kFirstDelay = 0.010;  // s
-// A deceleration as steep as each place allows has at most this many slopes, none shorter than
-// this.
+constexpr int kTries = 60;             // down to a millionth of the steepest slope
+constexpr double kLastResort = 1e-6;   // relative to the steepest slope
+constexpr double kFirstDelay = 0.010;  // [s]
+// A deceleration that is as steep as each place allows has at most this many slopes, and none is
+// shorter than this.
 constexpr double kMostSlopes = 100.0;
 constexpr double kMostCurves = 40.0;      // with a jerk limit
-constexpr double kShortestSlope = 0.001;  // s
+constexpr double kShortestSlope = 0.001;  // [s]
 
-// When a path from planFeedRate() reaches the rate, or its end [s].
+// [s] The time at which a path from planFeedRate() reaches the rate or its end.
 double timeToRate(const Profile& path, double rate) {
   const double duration = path.duration().value();
   if (path.pieceCount() == 0) return duration;
@@ -80,7 +80,7 @@ std::optional<Profile> TrajectoryPath::brake(std::int64_t at_ns, const MotionSta
   const bool smooth = std::any_of(members_.begin(), members_.end(), [&](const Member& member) {
     return (member.*bounds).jerk > 0.0;
   });
-  // The tolerance is for what a trajectory itself may exceed. With a jerk limit it needs that even
+  // The tolerance covers what the trajectory itself may exceed. With a jerk limit it is needed even
   // at a slightly lower rate.
   const double part = smooth ? 1.0 : 1.0 / (1.0 + kTrajectoryTolerance);
   std::vector<LimitedCurve> curves;
@@ -113,8 +113,8 @@ MotionState TrajectoryPath::onCurves(const MotionState& on_path) const {
   return state;
 }
 
-// As fast as the limits of all axes allow. If they never leave room for it, the trajectory
-// continues almost unchanged: it also ends at rest.
+// The rate changes as fast as the limits of all axes allow. If they never leave room for that, the
+// trajectory continues almost unchanged: it also ends at rest.
 Profile TrajectoryPath::changeRate(std::int64_t at_ns, const MotionState& from, double rate,
                                    Bounds bounds) const {
   const DoubleDouble end = members_.front().curve->duration();
@@ -143,7 +143,8 @@ Profile TrajectoryPath::changeRate(std::int64_t at_ns, const MotionState& from, 
   return {at_ns, std::move(pieces)};
 }
 
-// Now, or, if one of the axes is at its limit already, as soon as it leaves some room.
+// The change begins now or, if one of the axes is already at its limit, as soon as there is some
+// room.
 std::optional<Profile> TrajectoryPath::fastestChange(std::int64_t at_ns, const MotionState& from,
                                                      double rate, Bounds bounds) const {
   const DoubleDouble end = members_.front().curve->duration();
@@ -167,8 +168,8 @@ std::optional<Profile> TrajectoryPath::fastestChange(std::int64_t at_ns, const M
   return best;
 }
 
-// Ends the slope of a stop within the limits of stops: the trajectory may have a lower jerk limit,
-// which can't take it back in time.
+// Ends the slope of a stop within the limits of stops, because the trajectory may have a lower jerk
+// limit, which couldn't end it in time.
 std::vector<Piece> TrajectoryPath::rampDown(std::int64_t at_ns, const MotionState& from) const {
   FeedRateLimits limits = steepest(from, 0.0, &Member::stop_bounds);
   if (from.acceleration == 0.0 || limits.jerk == 0.0) return {};

@@ -17,9 +17,9 @@ class TrajectoryPath : public SharedPath {
  public:
   /// The motion of one axis.
   struct Member {
-    std::shared_ptr<const Profile> curve;  ///< of the motor; it starts at time 0
-    MotorBounds bounds;                    ///< of its motor
-    MotorBounds stop_bounds;               ///< the same, for stops
+    std::shared_ptr<const Profile> curve;  ///< the motor's; it starts at time 0
+    MotorBounds bounds;                    ///< the motor's limits
+    MotorBounds stop_bounds;               ///< the motor's limits for stops
   };
 
   /// @param members at least one. @param origin [s] the position on the path at which the curves
@@ -32,7 +32,7 @@ class TrajectoryPath : public SharedPath {
   DoubleDouble end() const { return origin_ + members_.front().curve->duration(); }
 
   MotionState begin() const override { return {origin_, 1.0, 0.0}; }
-  /// At full rate, if all axes are at rest there anyway.
+  /// Continues at full rate if all axes are at rest at that position anyway.
   MotionState restart(DoubleDouble position) const override;
   Profile plan(std::int64_t at, const MotionState& from, double speed_override) const override;
   Profile planStop(std::int64_t at, const MotionState& from) const override;
@@ -42,15 +42,15 @@ class TrajectoryPath : public SharedPath {
   using Bounds = MotorBounds Member::*;
 
   void endTogether();
-  /// Of the position on the curves.
+  /// [s] The time on the curves that belongs to a position on the path.
   Profile changeRate(std::int64_t at, const MotionState& from, double rate, Bounds bounds) const;
   /// @return no value if the limits leave no room for it.
   std::optional<Profile> fastestChange(std::int64_t at, const MotionState& from, double rate,
                                        Bounds bounds) const;
   std::vector<Piece> rampDown(std::int64_t at, const MotionState& from) const;
-  /// As changeRate(), or a steeper fall of the rate.
+  /// The path of changeRate(), or one on which the rate falls more steeply.
   Profile slowDown(std::int64_t at, const MotionState& from, double rate, Bounds bounds) const;
-  /// The steepest fall to a rate, if it takes less than a time [s].
+  /// The steepest fall to a rate, if it takes less time than this [s].
   std::optional<Profile> brake(std::int64_t at, const MotionState& from, double rate, Bounds bounds,
                                double sooner_than) const;
   Profile onPath(const Profile& on_curves) const;

@@ -52,7 +52,7 @@ enum class HomingPhase {
   kStopping,    ///< it has failed, and the axis comes to rest
 };
 
-/// In words, as in messages: `seeking`.
+/// The phase in words, as in messages: `seeking`.
 const char* nameOf(HomingPhase phase);
 
 /// How a homing ended.
@@ -92,7 +92,7 @@ struct AxisState {
   /// clock can't be read at one instant: of the places that the plan passed meanwhile, this is the
   /// one that is nearest to the position.
   double planned = 0.0;
-  double velocity = 0.0;  ///< [unit/s] of the plan
+  double velocity = 0.0;  ///< [unit/s] as planned
   double slack = 0.0;     ///< [unit] the part of the backlash that is taken up towards max
   double skew = 0.0;      ///< [unit] how far its motors have got apart since they were square
   /// [unit] Where the motion under way ends; the position at rest, and in a jog without an end.
@@ -137,7 +137,7 @@ struct MoveResult {
   MoveEnd end = MoveEnd::kReached;
   std::string message;    ///< a sentence that says how and where
   double position = 0.0;  ///< [unit] where the axis stands
-  double duration = 0.0;  ///< [s] that the motion took
+  double duration = 0.0;  ///< [s] the time that the motion took
 };
 
 /// A motion that was accepted.

@@ -101,13 +101,13 @@ enum class IdleAction { kDisable, kSleep };
 /// m on a linear axis, rad on a rotary one.
 struct HomingConfig {
   bool at_max = false;       ///< true: the switch is the max endstop; false: the min endstop
-  double seek_speed = 0.0;   ///< [unit/s] of the first approach to the switch
+  double seek_speed = 0.0;   ///< [unit/s] the speed of the first approach to the switch
   double latch_speed = 0.0;  ///< [unit/s] off the switch, and back to the trigger point
   double pull_off = 0.0;     ///< [unit] from the trigger point to the final position
   double offset = 0.0;       ///< [unit] position of the trigger point
   double max_travel = 0.0;   ///< [unit] longest stroke to reach or leave the switch
   double timeout = 60.0;     ///< [s] for the whole homing
-  double debounce = 0.005;   ///< [s] that a level of the switch must last to count
+  double debounce = 0.005;   ///< [s] a level of the switch must last so long to count
   int order = 0;  ///< axes with the lowest number go first; the same number: simultaneously
 };
 
@@ -171,7 +171,7 @@ struct AxisConfig : MotorConfig {
   double start_speed = 0.0;   ///< [unit/s] reached without a ramp (pull-in); 0: ramps start at rest
   double acceleration = 0.0;  ///< [unit/s^2]
   double deceleration = 0.0;  ///< [unit/s^2]
-  /// [unit/s^2] Of a stop; at least the deceleration, which is also the default.
+  /// [unit/s^2] For stops; at least the deceleration, which is also the default.
   std::optional<double> stop_deceleration;
   double jerk = 0.0;  ///< [unit/s^3] 0: the acceleration may jump
   /// One for each oscillation; empty: motions are made as they are planned. There are none with a

@@ -16,10 +16,10 @@ using Matrix = std::vector<std::vector<double>>;
 /// a brake.
 struct Kinematics {
   std::vector<std::string> axes;  ///< their names
-  /// By motor: [unit] how far it moves for a unit of each axis. A unit of a motor is as many steps
-  /// as one of the axis that has its pins.
+  /// For each motor: [unit] how far it moves for a unit of each axis. A unit of a motor is as many
+  /// steps as one of the axis that has its pins.
   Matrix matrix;
-  /// By axis: [unit] how far it moves for a unit of each motor.
+  /// For each axis: [unit] how far it moves for a unit of each motor.
   Matrix inverse;
 
   /// The place of an axis among them; their number if it isn't one of them.

@@ -28,7 +28,7 @@ struct CoordinatedResult {
   axis::MoveEnd end = axis::MoveEnd::kReached;
   std::string message;            ///< a sentence that says how, and names the axis that ended it
   std::vector<double> positions;  ///< [unit] where the members stand
-  double duration = 0.0;          ///< [s] that it took
+  double duration = 0.0;          ///< [s] the time that it took
 };
 
 /// How such a motion ended, from how each of its axes ended it: for a move that outlived its

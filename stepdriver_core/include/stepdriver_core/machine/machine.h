@@ -28,7 +28,7 @@ namespace stepdriver::machine {
 /// the motors' power away then. It isn't a certified safety function.
 struct HeartbeatConfig {
   std::string line;     ///< low before its first edge, and again once the machine has released it
-  double rate = 100.0;  ///< [Hz] of whole periods, of two edges each
+  double rate = 100.0;  ///< [Hz] whole periods of two edges each
 };
 
 /// What an emergency stop does to the motors.
@@ -95,8 +95,8 @@ struct EngineFigures {
   std::uint64_t edges = 0;  ///< edges of all STEP lines, both ends of each pulse
   std::uint64_t pulses = 0;
   std::uint64_t slips = 0;      ///< times that the timeline was slid because a pulse was late
-  double slipped = 0.0;         ///< [s] by how much altogether
-  double worst_lateness = 0.0;  ///< [s] of one pulse
+  double slipped = 0.0;         ///< [s] the sum of these delays
+  double worst_lateness = 0.0;  ///< [s] the largest of a pulse
   /// Of the pulses since the start, and of those in the last whole second of the clock [ns].
   pulse::LatenessFigures lateness;
   pulse::LatenessFigures lateness_last_second;

@@ -37,7 +37,7 @@ struct MachineConfig {
   std::vector<config::AxisConfig> axes;  ///< in the order of their names
   double max_lateness = 0.005;           ///< [s] a pulse that is later is a fault
   double late_steps = 0.25;              ///< [full steps] see machine::MachineOptions
-  double write_timeout = 0.5;            ///< [s] of a line other than STEP and DIR
+  double write_timeout = 0.5;            ///< [s] for a line other than STEP and DIR
   bool enforce_realtime = false;         ///< don't start if the computer is too slow for the axes
   bool keep_cpus_awake = true;           ///< see pulse::kCpuLatencyDevice
   std::optional<int> cpu;                ///< see pulse::RealtimeRequest

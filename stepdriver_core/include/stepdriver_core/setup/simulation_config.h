@@ -30,7 +30,7 @@ struct SimulatedMotor {
   /// [Nm] Empty: as much as loses no step, see sim::soundMotor().
   std::optional<double> holding_torque;
   double rotor_inertia = 54.0;  ///< [g cm^2]
-  double load_inertia = 54.0;   ///< [g cm^2] of all that it moves, at the motor's shaft
+  double load_inertia = 54.0;   ///< [g cm^2] the inertia of all that it moves, at the motor's shaft
   double friction = 0.0;        ///< [Nm]
   double damping = 0.2;         ///< damping ratio
 };
@@ -45,9 +45,10 @@ struct SimulatedAxis {
   /// [mm|deg] Position of the switch; empty: outside the soft limit.
   std::optional<double> min_switch;
   std::optional<double> max_switch;
-  double settling_ms = 10.0;    ///< [ms] from the last pulse until the driver is in position
-  double load_falls = 0.0;      ///< [mm/s|deg/s] of a load that nothing holds, towards min
-  double spring_hz = 0.0;       ///< [Hz] of a mass that the carriage pulls by a spring; 0: none
+  double settling_ms = 10.0;  ///< [ms] from the last pulse until the driver is in position
+  double load_falls = 0.0;  ///< [mm/s|deg/s] how fast a load falls that nothing holds, towards min
+  /// [Hz] frequency of a mass that the carriage pulls by a spring; 0: none.
+  double spring_hz = 0.0;
   double spring_damping = 0.1;  ///< its damping ratio: what an input shaper expects by default
   SimulatedMotor motor;
   SimulatedWiring wiring;

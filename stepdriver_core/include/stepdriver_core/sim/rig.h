@@ -65,7 +65,7 @@ struct SpringSpec {
 struct MotorLimits {
   double rate = 0.0;          ///< [steps/s] the highest; above 0
   double acceleration = 0.0;  ///< [steps/s^2] the highest, speeding up or slowing down; above 0
-  double start_rate = 0.0;    ///< [steps/s] by which the speed may jump
+  double start_rate = 0.0;    ///< [steps/s] the speed may jump by this much
   /// [steps] How far the steps may be behind their plan when they go out. 0: their times are
   /// exactly as planned, on a virtual clock. Otherwise late steps may catch up with the plan, and
   /// no acceleration can be judged.
@@ -125,9 +125,10 @@ struct RigAxisSpec {
 /// is a way of the n-th column of `inverse`.
 struct RigCoupling {
   std::vector<std::string> axes;
-  /// By motor: [mm|deg] for each mm or degree of each carriage, in full_step_travel of its axis.
+  /// For each motor: [mm|deg] for each mm or degree of each carriage, in full_step_travel of its
+  /// axis.
   std::vector<std::vector<double>> matrix;
-  /// By carriage: [mm|deg] for each mm or degree of each motor.
+  /// For each carriage: [mm|deg] for each mm or degree of each motor.
   std::vector<std::vector<double>> inverse;
 };
 
@@ -179,7 +180,7 @@ enum class Violation {
   kAboveAcceleration,
 };
 
-/// In words, as in reports: `short step high`.
+/// The violation in words, as in reports: `short step high`.
 const char* nameOf(Violation violation);
 
 /// What an axis of the rig has seen so far.
@@ -206,7 +207,7 @@ struct RigAxisReport {
   /// The first step beyond MotorLimits, with its time and numbers; empty if there was none.
   std::string beyond_limits;
 
-  /// Of all kinds together.
+  /// The number of violations of all kinds together.
   std::int64_t totalViolations() const;
 };
 

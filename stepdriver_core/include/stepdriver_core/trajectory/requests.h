@@ -129,9 +129,9 @@ struct PathAppend {
 /// What lies ahead of axes on a path to which segments can be appended.
 struct PathAhead {
   std::size_t segments = 0;     ///< segments that they have not passed
-  std::size_t room = 0;         ///< for so many more
-  double time = 0.0;            ///< [s] that they take at the speed override of 1
-  double passed = 0.0;          ///< [s] that the path took until now, at that override
+  std::size_t room = 0;         ///< this many more segments fit
+  double time = 0.0;            ///< [s] the time that they take at the speed override of 1
+  double passed = 0.0;          ///< [s] the time that the path took until now, at that override
   bool more_follows = false;    ///< false: the end of these is the end of the path
   std::vector<double> targets;  ///< [unit] the commanded positions at their end
 };

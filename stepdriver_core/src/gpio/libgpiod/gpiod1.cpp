@@ -80,7 +80,7 @@ class Bulk {
     return levels[static_cast<std::size_t>(index)];
   }
 
-  /// For a request of one line with edges.
+  /// Only for a request of one line with edges.
   int edgeFd() { return gpiod_line_event_get_fd(gpiod_line_bulk_get_line(&lines_, 0)); }
 
  private:

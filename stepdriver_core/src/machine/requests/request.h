@@ -50,7 +50,7 @@ inline bool readsInputs(const Request& request) {
   return std::visit([](const auto& wanted) { return wanted.kReadsInputs; }, request);
 }
 
-/// In words, as the flight recorder shows it: "x: move to 0.1 m".
+/// The request in words, as the flight recorder shows it: "x: move to 0.1 m".
 inline std::string textOf(const Request& request, const AxisWords& axes) {
   return std::visit([&axes](const auto& wanted) { return wanted.text(axes); }, request);
 }

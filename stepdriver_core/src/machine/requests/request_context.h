@@ -59,7 +59,7 @@ class RequestContext {
   axis::AxisModel& axis(AxisId id) const { return *context.axes.at(id); }
   /// The axis, and all that share its motors.
   std::vector<axis::AxisModel*> withSharers(AxisId id) const;
-  /// Of the axis's present or held motion; nullptr if there is none.
+  /// The plan of the axis's present or held motion; nullptr if there is none.
   const activity::Goal* goalOf(const axis::AxisModel& axis) const;
   /// The goal with a number of its own, and an outcome for its result.
   activity::Goal withOutcome(activity::Goal goal) const;
@@ -81,7 +81,7 @@ class RequestContext {
   std::uint64_t homings_ = 0;
 };
 
-/// [microsteps] Where the joint of an axis at rest is.
+/// [microsteps] The place of the joint of an axis at rest.
 inline double restOf(const motion::PathStart& start) {
   return start.motor.position.value() - start.slack;
 }
