@@ -4,7 +4,7 @@ import math
 
 from std_srvs.srv import SetBool, Trigger
 
-from stepdriver.srv import Home, HomeAxes, MoveTo, SetPosition, SpeedOverride
+from stepdriver.srv import Home, HomeAxes, MoveTo, SetOutput, SetPosition, SpeedOverride
 
 from .errors import Refusal
 from .units import in_page_units, position_text
@@ -54,6 +54,13 @@ def set_zero(machine, message):
     return f"{axis.name}: this position is {position_text(answer.position * axis.factor, axis.unit)} from now on"
 
 
+def set_output(machine, message):
+    name = message.get("output")
+    if not isinstance(name, str):
+        raise Refusal(f"output is {str(name)[:40]}, but must be the name of an output")
+    return machine.driver.call("set_output", SetOutput, name=name, on=message.get("on") is True).message
+
+
 def speed_override(machine, message):
     return machine.driver.call("speed_override", SpeedOverride, factor=number(message, "factor")).message
 
@@ -67,6 +74,7 @@ COMMANDS = {
     "home": home,
     "move": move,
     "set_zero": set_zero,
+    "set_output": set_output,
     "speed_override": speed_override,
     "hold": trigger("hold"),
     "resume": trigger("resume"),

@@ -15,7 +15,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from stepdriver.msg import AxisStates, Endstops, Jog
+from stepdriver.msg import AxisStates, Endstops, IoStates, Jog
 
 from .errors import Refusal
 from .units import UNITS, in_page_units
@@ -123,6 +123,7 @@ class Driver:
         self.emergency_stop = Urgent(f"{self.name}/emergency_stop")
         self.events = deque(maxlen=EVENTS)
         self.states, self.endstops, self.joints, self.engine = Newest(), Newest(), Newest(JOINT_STATES), Newest()
+        self.io = Newest()  # of pairs: IoStates, and what to add to its stamps to get monotonic time [s]
         self._jog = rospy.Publisher(f"{self.name}/jog", Jog, queue_size=1, tcp_nodelay=True)
         self._watched = []
         # Always, so that a page shows what happened before it was opened; it is rare.
@@ -134,6 +135,7 @@ class Driver:
         self._watched = [
             rospy.Subscriber(f"{self.name}/axis_states", AxisStates, self.states.take),
             rospy.Subscriber(f"{self.name}/endstops", Endstops, self.endstops.take),
+            rospy.Subscriber(f"{self.name}/io_states", IoStates, self._take_io),
             rospy.Subscriber(f"{space}joint_states", JointState, self.joints.take)]
         try:
             from diagnostic_msgs.msg import DiagnosticArray
@@ -175,6 +177,9 @@ class Driver:
     def _take_log(self, message):
         if message.name == self.name and message.level in LEVELS:
             self.tell(LEVELS[message.level], in_page_units(message.msg))
+
+    def _take_io(self, message):
+        self.io.take((message, time.monotonic() - rospy.get_time()))
 
     def _take_diagnostics(self, message):
         own = f"{self.name.rpartition('/')[2]}: {ENGINE}"

@@ -18,6 +18,7 @@ class Machine:
         self.jog_timeout = 0.5
         self.recorder = {}
         self._source, self._states = None, []
+        self._io_source, self._io = None, {"outputs": [], "inputs": []}
 
     def age(self):
         """[s] of the newest state; infinite if there is none."""
@@ -67,6 +68,27 @@ class Machine:
     @staticmethod
     def _switch(active):
         return {"active": active, "text": Endstops.PRESSED if active else Endstops.OPEN}
+
+    def io(self):
+        """The outputs and inputs with a name; the same object as before if no message has come. A change is a
+        monotonic time, as the tick of an update is, so that the page can tell how long ago it was."""
+        if self.driver.io.message is not None and self.driver.io.message is not self._io_source:
+            self._io_source = self.driver.io.message
+            message, to_monotonic = self._io_source
+
+            def changed(stamp):
+                return None if stamp.is_zero() else round(stamp.to_sec() + to_monotonic, 3)
+            self._io = {
+                "outputs": [{"name": name, "on": on, "changed": changed(stamp), "note": in_page_units(note),
+                             "error": error}
+                            for name, on, stamp, note, error in zip(
+                                message.output_name, message.output_on, message.output_changed,
+                                message.output_note, message.output_error)],
+                "inputs": [{"name": name, "active": active, "changed": changed(stamp), "error": error}
+                           for name, active, stamp, error in zip(
+                               message.input_name, message.input_active, message.input_changed,
+                               message.input_error)]}
+        return self._io
 
     def override(self):
         message = self.driver.states.message

@@ -80,6 +80,7 @@ class Panel:
         self._way = self.machine.way(self.drawing.shown["axes"])
         self.publish_drawing()
         self.publish("states", self.machine.states())
+        self.publish("io", self.machine.io())
         self.publish("override", self.machine.override())
         self.publish("events", list(self.machine.driver.events))
         self._publish_control()
@@ -249,7 +250,8 @@ class Panel:
         self.machine.driver.jog(axis, velocity)
 
     def _start(self, viewer, call, message):
-        name = (message["do"], message.get("axis") if isinstance(message.get("axis"), str) else None)
+        of = message.get("output" if message["do"] == "set_output" else "axis")
+        name = (message["do"], of if isinstance(of, str) else None)
         shown = (f"{name[1]}: " if name[1] else "") + name[0].replace("_", " ")
         if name in self._pending:
             raise Refusal(f"{shown}: not sent again, because the driver has not answered the last one yet")

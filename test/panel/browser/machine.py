@@ -22,6 +22,11 @@ PAUSE = 0.05  # [s] between two looks
 CONFIG = """
 jog_timeout: 1.5
 recorder: {folder: FOLDER/recordings, keep: 5}
+outputs:
+  pen: {pin: GPIO5, active_level: high, initial: off, at_fault: off}
+  lamp: {pin: GPIO6, active_level: high, initial: off, at_fault: off}
+inputs:
+  paper: {pin: GPIO12, active_level: high}
 axes:
   x:
     driver: a4988
@@ -93,14 +98,22 @@ class Machine:
         self.port = int(re.search(r":(\d+)/", self.link)[1])
         self.token = self.link.partition("#")[2]
         import rospy
-        from stepdriver.msg import AxisStates
+        from stepdriver.msg import AxisStates, IoStates
         rospy.init_node("test", anonymous=True, disable_signals=True)
-        self._states = None
+        self._states, self._io = None, None
+        rospy.Subscriber("/stepdriver/io_states", IoStates, self._take_io)
         rospy.Subscriber("/stepdriver/axis_states", AxisStates, self._take)
         wait_until(lambda: self._states, "the state of the axes")
 
     def _take(self, message):
         self._states = message
+
+    def _take_io(self, message):
+        self._io = message
+
+    def is_on(self, output):
+        """Whether an output is on, as the driver says."""
+        return self._io.output_on[self._io.output_name.index(output)]
 
     def _link(self):
         if self._launch.poll() is not None:

@@ -6,7 +6,7 @@ import unittest
 
 from machine import Machine, Network, Page, browser, wait_until
 from selenium.webdriver.common.keys import Keys
-from stepdriver.srv import MoveTo
+from stepdriver.srv import MoveTo, SetOutput
 
 JOG_TIMEOUT = 1.5  # [s] of the machine: longer than a busy browser takes between two messages
 PRESSES = 5  # a jog may end by itself on a busy computer
@@ -108,6 +108,39 @@ class Controls(OnTheMachine):
         wait_until(lambda: "endstop" in self.page.find(self.page.axis("x", '[data-field="stopped"]')).text,
                    "the page says which")
         wait_until(lambda: self.page.find(self.page.axis("x", '[data-field="min"]')).text == "PRESSED", "and that it is")
+
+    def line(self, name):
+        """The text beside an output or input, without its switch."""
+        return self.page.find(f'#io [data-name="{name}"] .io-state').text
+
+    def test_outputs_are_switched_and_show_what_the_driver_says(self):
+        switch = '#outputs [data-name="pen"] button'
+        wait_until(lambda: self.line("pen").startswith("off"), "the pen is off")
+        self.assertEqual(self.page.find(switch).get_attribute("aria-checked"), "false")
+        self.page.click(switch)
+        wait_until(lambda: machine.is_on("pen"), "the driver has switched it on")
+        wait_until(lambda: self.page.find(switch).get_attribute("aria-checked") == "true", "the switch is on")
+        wait_until(lambda: self.line("pen").startswith("on for "), "and so is its text")
+        self.assertFalse(machine.is_on("lamp"))
+        self.assertIn("off", self.line("lamp"))
+        # Another client, and what the driver does by itself, are shown too.
+        machine.call("set_output", SetOutput, name="pen", on=False)
+        wait_until(lambda: self.page.find(switch).get_attribute("aria-checked") == "false", "the switch is off")
+        self.page.click(switch)
+        wait_until(lambda: self.line("pen").startswith("on for "), "the pen is on again")
+        self.page.click("#emergency")
+        wait_until(lambda: self.line("pen").startswith("off for "), "the pen is safe")
+        self.page.click(switch)
+        wait_until(lambda: "set output" in self.page.find("#events").text, "the refusal is listed")
+        self.assertFalse(machine.is_on("pen"))
+
+    def test_inputs_show_their_state_and_its_age(self):
+        from std_srvs.srv import SetBool
+        wait_until(lambda: self.line("paper").startswith("inactive"), "the paper's input is inactive")
+        machine.call("rig/inputs/paper", SetBool, data=True)
+        self.addCleanup(machine.call, "rig/inputs/paper", SetBool, data=False)
+        wait_until(lambda: self.line("paper").startswith("active for "), "it is active")
+        wait_until(lambda: self.line("paper") not in ("active for 0 s", "active for 1 s"), "its age grows")
 
     def test_setting_zero_asks_first(self):
         self.page.click(self.page.axis("y", '[data-by="1"]'))

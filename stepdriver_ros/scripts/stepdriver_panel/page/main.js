@@ -2,6 +2,7 @@
 
 import { Connection } from "./connection.js";
 import { DrawingScreen } from "./drawing.js";
+import { IoCard } from "./io.js";
 import { MachineScreen, setText } from "./machine.js";
 import { PlotsScreen } from "./plots.js";
 
@@ -18,6 +19,7 @@ function say(good, text, answer = {}) {
 
 const connection = new Connection(update, say);
 const machine = new MachineScreen(connection);
+const io = new IoCard(connection);
 const plots = new PlotsScreen(connection, say);
 const screens = [new DrawingScreen(connection), plots];
 
@@ -81,6 +83,7 @@ const SHOW = {
     if (parts.states) machine.showStates(parts.states);
   },
   states: (value) => machine.showStates(value),
+  io: (value) => io.show(value),
   override: (value) => machine.showOverride(value),
   events: (value) => machine.showEvents(value),
   control: () => {},
@@ -97,6 +100,7 @@ function update(values) {
   }
   showControl();
   machine.showPositions(values.positions);
+  io.age(values.tick);
   for (const screen of screens) screen.update(values, parts);
 }
 
