@@ -214,6 +214,21 @@ py::list axesOf(const Session& session) {
   return axes;
 }
 
+// The states of the outputs, or of the inputs, by their names.
+template <typename State>
+py::dict byName(const std::vector<State>& states) {
+  py::dict values;
+  for (const State& state : states) values[py::str(state.name)] = valueOf(state);
+  return values;
+}
+
+machine::IoStates ioStatesOf(const Session& session) {
+  return session.run([](OpenMachine& open) { return open.machine().ioStates(); });
+}
+
+py::dict outputsOf(const Session& session) { return byName(ioStatesOf(session).outputs); }
+py::dict inputsOf(const Session& session) { return byName(ioStatesOf(session).inputs); }
+
 setup::Simulation& simulationOf(OpenMachine& open) {
   setup::Simulation* const simulation = open.hardware().simulation();
   if (simulation == nullptr) throw Refused("there is no rig: the machine drives GPIO lines");
@@ -381,6 +396,9 @@ void bindMachine(SessionClass& session) {
            [](const Session& self) {
              return self.run([](OpenMachine& open) { return open.machine().emergencyStopped(); });
            })
+      .def("set_output", command(&Machine::setOutput), "name"_a, "on"_a)
+      .def("outputs", &outputsOf)
+      .def("inputs", &inputsOf)
       .def("figures",
            [](const Session& self) {
              return valueOf(self.run([](OpenMachine& open) { return open.machine().figures(); }));
@@ -404,6 +422,12 @@ void bindMachine(SessionClass& session) {
 void bindRig(SessionClass& session) {
   session.def("rig_report", &reportOf, "axis"_a)
       .def("press_endstop", &pressEndstop, "axis"_a, "at_max"_a, "pressed"_a)
+      .def(
+          "press_input",
+          [](const Session& self, const std::string& name, bool pressed) {
+            self.run([&](OpenMachine& open) { simulationOf(open).pressInput(name, pressed); });
+          },
+          "name"_a, "pressed"_a)
       .def(
           "press_emergency_stop",
           [](const Session& self, bool pressed) {

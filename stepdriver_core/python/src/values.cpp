@@ -2,6 +2,8 @@
 
 #include <pybind11/stl.h>
 
+#include <optional>
+
 namespace stepdriver::python {
 namespace {
 
@@ -40,6 +42,12 @@ const char* nameOf(axis::HomingEnd end) {
       return "failed";
   }
   return "";
+}
+
+// [s] On the clock of the machine.
+std::optional<double> secondsOf(const std::optional<pulse::Nanoseconds>& time) {
+  if (!time) return {};
+  return static_cast<double>(*time) * 1e-9;
 }
 
 }  // namespace
@@ -101,6 +109,16 @@ py::dict valueOf(const motion::PathAhead& ahead) {
   return py::dict("segments"_a = ahead.segments, "room"_a = ahead.room, "time"_a = ahead.time,
                   "passed"_a = ahead.passed, "more_follows"_a = ahead.more_follows,
                   "targets"_a = ahead.targets);
+}
+
+py::dict valueOf(const machine::OutputState& output) {
+  return py::dict("on"_a = output.on, "changed"_a = secondsOf(output.changed),
+                  "note"_a = output.note, "error"_a = output.error);
+}
+
+py::dict valueOf(const machine::InputState& input) {
+  return py::dict("active"_a = input.active, "changed"_a = secondsOf(input.changed),
+                  "error"_a = input.error);
 }
 
 py::dict valueOf(const machine::EngineFigures& figures) {

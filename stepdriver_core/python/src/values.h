@@ -20,6 +20,8 @@ pybind11::dict valueOf(const axis::MovePlan& plan);
 pybind11::dict valueOf(const machine::CoordinatedResult& result);
 pybind11::dict valueOf(const motion::PathAhead& ahead);
 pybind11::dict valueOf(const machine::EngineFigures& figures);
+pybind11::dict valueOf(const machine::OutputState& output);
+pybind11::dict valueOf(const machine::InputState& input);
 pybind11::dict valueOf(const sim::RigAxisReport& report);
 
 /// None if there is none.

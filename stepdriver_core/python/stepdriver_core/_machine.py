@@ -12,7 +12,7 @@ from ._axis import Axis, _homing_result
 from ._errors import NoSuchAxis, NotHomed
 from ._moves import CoordinatedMove
 from ._paths import Segment
-from ._states import AxisState, EngineFigures, HomingEnd, HomingResult, RigReport
+from ._states import AxisState, EngineFigures, HomingEnd, HomingResult, InputState, OutputState, RigReport
 
 if typing.TYPE_CHECKING:
     from typing_extensions import Self
@@ -322,6 +322,28 @@ class Machine:
         """
         self._session.recover()
 
+    # ---- outputs and inputs ----
+
+    @property
+    def outputs(self) -> Dict[str, OutputState]:
+        """The states of the outputs that have a name (``outputs`` in the configuration), by their names."""
+        return {name: OutputState(**fields) for name, fields in self._session.outputs().items()}
+
+    @property
+    def inputs(self) -> Dict[str, InputState]:
+        """The states of the inputs that have a name (``inputs`` in the configuration), by their names."""
+        return {name: InputState(**fields) for name, fields in self._session.inputs().items()}
+
+    def set_output(self, name: str, on: bool) -> None:
+        """Switches an output, as soon as its least times allow, and returns when its line was written.
+
+        From an emergency stop, a fault of the machine or a shutdown on, each output is in its safe state.
+
+        Raises Refused if there is no such output or while the outputs are in their safe states, and Error if its line
+        can't be written.
+        """
+        self._session.set_output(name, on)
+
     # ---- time and figures ----
 
     @property
@@ -374,6 +396,10 @@ class Rig:
         if end not in ("min", "max"):
             raise ValueError(f"the end is {end!r}, but must be 'min' or 'max'")
         self._session.press_endstop(axis, end == "max", pressed)
+
+    def press_input(self, name: str, pressed: bool = True) -> None:
+        """Makes an input with a name active as if by hand, or inactive. Raises Error if there is no such input."""
+        self._session.press_input(name, pressed)
 
     def press_emergency_stop(self, pressed: bool = True) -> None:
         """Presses the button of the emergency-stop input, or releases it. Raises Refused if none is configured."""

@@ -168,6 +168,32 @@ class PathAhead:
 
 
 @dataclass(frozen=True)
+class OutputState:
+    """The state of an output with a name."""
+
+    on: bool
+    """As its line was written last."""
+    changed: Optional[float]
+    """[s] on the clock of ``Machine.time``, when that write had ended; None: not since the start."""
+    note: str
+    """Why it was switched off by itself; empty until that happens."""
+    error: str
+    """Why its line could not be written, so that ``on`` isn't certain; empty: it could."""
+
+
+@dataclass(frozen=True)
+class InputState:
+    """The state of an input with a name."""
+
+    active: bool
+    """Its level is the active one."""
+    changed: Optional[float]
+    """[s] on the clock of ``Machine.time``, when the level changed; None: not since the start."""
+    error: str
+    """Why it can't be read, so that ``active`` is the last reading; empty: it can."""
+
+
+@dataclass(frozen=True)
 class EngineFigures:
     """What the pulse engine has done since the start."""
 

@@ -1,0 +1,70 @@
+"""Outputs and inputs with a name."""
+
+import unittest
+
+from stepdriver_core import Error, InputState, OutputState, Refused
+
+import support
+
+
+class OutputsAndInputs(support.MachineTest):
+    CONFIG = {
+        "axes": {"x": support.axis()},
+        "outputs": {"pen": {"pin": "GPIO20", "min_off_ms": 50.0}, "lamp": {"pin": "GPIO21"}},
+        "inputs": {"paper": {"pin": "GPIO16", "active_level": "low", "debounce_ms": 5.0}},
+    }
+
+    def test_have_their_states_by_name(self):
+        off = OutputState(on=False, changed=None, note="", error="")
+        self.assertEqual(self.machine.outputs, {"lamp": off, "pen": off})
+        self.assertEqual(self.machine.inputs, {"paper": InputState(active=False, changed=None, error="")})
+
+    def test_an_output_is_switched_when_the_call_returns(self):
+        self.machine.set_output("pen", True)
+        pen = self.machine.outputs["pen"]
+        self.assertTrue(pen.on)
+        self.assertLessEqual(pen.changed, self.machine.time)
+        self.assertFalse(self.machine.outputs["lamp"].on)
+        self.machine.set_output("pen", False)
+        switched_off = self.machine.outputs["pen"].changed
+        self.machine.set_output("pen", True)
+        self.assertGreaterEqual(self.machine.outputs["pen"].changed - switched_off, 0.05)
+
+    def test_an_output_is_safe_from_an_emergency_stop_on(self):
+        self.machine.set_output("pen", True)
+        self.machine.emergency_stop()
+        self.assertFalse(self.machine.outputs["pen"].on)
+        with self.assertRaises(Refused):
+            self.machine.set_output("pen", True)
+        self.machine.recover()
+        self.assertFalse(self.machine.outputs["pen"].on)
+        self.machine.set_output("pen", True)
+        self.assertTrue(self.machine.outputs["pen"].on)
+
+    def test_an_input_follows_its_line(self):
+        before = self.machine.time
+        self.machine.rig.press_input("paper")
+        self.machine.advance(0.02)
+        paper = self.machine.inputs["paper"]
+        self.assertTrue(paper.active)
+        self.assertGreaterEqual(paper.changed, before)
+        self.machine.rig.press_input("paper", False)
+        self.machine.advance(0.02)
+        self.assertFalse(self.machine.inputs["paper"].active)
+
+    def test_unknown_names_are_refused(self):
+        with self.assertRaisesRegex(Refused, r"^there is no output pan \(outputs: .*pen.*\)$"):
+            self.machine.set_output("pan", True)
+        with self.assertRaisesRegex(Error, "pepper"):
+            self.machine.rig.press_input("pepper")
+
+
+class NoLinesWithAName(support.MachineTest):
+    def test_are_empty(self):
+        self.assertEqual((self.machine.outputs, self.machine.inputs), ({}, {}))
+        with self.assertRaisesRegex(Refused, "none is configured"):
+            self.machine.set_output("pen", True)
+
+
+if __name__ == "__main__":
+    unittest.main()
