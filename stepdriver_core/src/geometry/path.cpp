@@ -152,6 +152,7 @@ Path::Segment Path::placed(const std::vector<double>& from, const CurveSegment& 
   segment.shape = given.shape;
   segment.speed = given.speed;
   segment.measured = given.measured;
+  segment.to = given.end;
   if (given.shape == CurveSegment::Shape::kBezier) {
     segment.powers.resize(4 * axes());
     const auto [control1, control2] = awayFromEnds(from, given, kHandle * resolution_);
@@ -193,6 +194,15 @@ Path::Segment Path::placed(const std::vector<double>& from, const CurveSegment& 
                                   given.end[given.plane[1]] - given.centre[1]);
     const double growth = end - segment.radius;
     if (std::abs(growth) > kRoundRadius * segment.radius) segment.growth = growth;
+    const double turned = segment.from + segment.angle;
+    const double last = segment.radius + segment.growth;
+    segment.spoke = {segment.radius * std::cos(segment.from),
+                     segment.radius * std::sin(segment.from)};
+    const std::array<double, 2> way{last * std::cos(turned) - segment.spoke[0],
+                                    last * std::sin(turned) - segment.spoke[1]};
+    for (std::size_t k = 0; k < 2; ++k) {
+      segment.gap[k] = segment.powers[2 * given.plane[k] + 1] - way[k];
+    }
   }
   return segment;
 }
@@ -410,24 +420,29 @@ void Path::evaluateGiven(std::size_t index, double u, PathPoint& point) const {
       point.first[i] = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
       point.second[i] = 2.0 * c[2] + u * 6.0 * c[3];
     }
-    return;
+  } else {
+    for (std::size_t i = 0; i < axes(); ++i) {
+      const double* c = &segment.powers[2 * i];
+      point.position[i] = c[0] + u * c[1];
+      point.first[i] = c[1];
+      point.second[i] = 0.0;
+    }
   }
-  for (std::size_t i = 0; i < axes(); ++i) {
-    const double* c = &segment.powers[2 * i];
-    point.position[i] = c[0] + u * c[1];
-    point.first[i] = c[1];
-    point.second[i] = 0.0;
-  }
-  if (segment.shape == CurveSegment::Shape::kLine) return;
+  if (segment.shape == CurveSegment::Shape::kArc) evaluateArc(segment, u, point);
+  if (u == 1.0) point.position = segment.to;
+}
+
+// The two axes of its plane.
+void Path::evaluateArc(const Segment& segment, double u, PathPoint& point) {
   const double angle = segment.from + u * segment.angle;
   const double radius = segment.radius + u * segment.growth;
   const double x = radius * std::cos(angle);
   const double y = radius * std::sin(angle);
   const auto [a, b] = segment.plane;
-  point.position[a] = segment.centre[0] + x;
-  point.position[b] = segment.centre[1] + y;
-  point.first[a] = -y * segment.angle;
-  point.first[b] = x * segment.angle;
+  point.position[a] = segment.powers[2 * a] + (x - segment.spoke[0]) + u * segment.gap[0];
+  point.position[b] = segment.powers[2 * b] + (y - segment.spoke[1]) + u * segment.gap[1];
+  point.first[a] = -y * segment.angle + segment.gap[0];
+  point.first[b] = x * segment.angle + segment.gap[1];
   point.second[a] = -x * segment.angle * segment.angle;
   point.second[b] = -y * segment.angle * segment.angle;
   if (segment.growth == 0.0) return;
@@ -478,8 +493,7 @@ void Path::blend(const End& end, double distance, double sign, PathPoint& point)
 std::pair<double, double> Path::range(std::size_t index, std::size_t axis) const {
   const Segment& segment = segments_[index];
   if (isLine(index)) {
-    const double* c = &segment.powers[2 * axis];
-    return std::minmax({c[0], c[0] + c[1]});
+    return std::minmax({segment.powers[2 * axis], segment.to[axis]});
   }
   PathPoint point;
   evaluateGiven(index, 0.0, point);

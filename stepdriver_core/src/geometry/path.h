@@ -124,7 +124,8 @@ class Path {
   const std::vector<double>& start() const { return start_; }
   double resolution() const { return resolution_; }
 
-  /// The point at a parameter from 0 to 1.
+  /// The point at a parameter from 0 to 1. Two segments have exactly the same place at their
+  /// corner: an axis that rests on one of them isn't moved by rounding, however low its limits are.
   void evaluate(std::size_t segment, double parameter, PathPoint& point) const;
   /// The point of the path as given, with all its corners.
   void evaluateGiven(std::size_t segment, double parameter, PathPoint& point) const;
@@ -176,14 +177,19 @@ class Path {
   struct Segment {
     CurveSegment::Shape shape;
     // Coefficients of the powers of the parameter, one after the other: 2 for each axis, or 4 for a
-    // Bezier. For an arc, those of its two axes are unused.
+    // Bezier. For an arc, those of its two axes are only its begin and the way to its end.
     std::vector<double> powers;
+    std::vector<double> to;  // the end, which the powers may miss by their rounding
     std::array<std::size_t, 2> plane{};
     std::array<double, 2> centre{};
     double radius = 0.0;  // at its begin
     double growth = 0.0;  // by which the radius rises up to its end
     double from = 0.0;    // [rad] the angle of its begin
     double angle = 0.0;
+    // For the two axes: the way from the centre to the begin, and by what the angles and radii,
+    // which are rounded, miss the end.
+    std::array<double, 2> spoke{};
+    std::array<double, 2> gap{};
     End begin;
     End end;
     // The corners of other segments whose roundings reach this line.
@@ -205,6 +211,7 @@ class Path {
   void findOpen(std::size_t first, std::size_t last);
   std::pair<double, double> rounded(std::size_t segment) const;
   double sharpest(const Segment& segment, double rate) const;
+  static void evaluateArc(const Segment& segment, double u, PathPoint& point);
   void blend(const End& end, double distance, double sign, PathPoint& point) const;
 
   std::vector<double> start_;

@@ -49,6 +49,9 @@ struct TimingStart {
   /// @}
   /// [s] How long ago the motion was exactly there; less than half a nanosecond.
   double ago = 0.0;
+  /// [s] Of the motion so far, from which times are counted, and by which they are rounded. Ignored
+  /// if accelerations may jump.
+  double before = 0.0;
 };
 
 /// The motion along a path.

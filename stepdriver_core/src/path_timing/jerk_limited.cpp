@@ -21,10 +21,11 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
-// Of a jerk limit: rounded times and numbers change a jerk by no more. The times of both ends of a
-// quintic of the duration h are rounded by e each, which changes its jerk j by 9 j e/h, and numbers
-// that are rounded by r change it by 60 r/h^3 if they are positions, and by 24 r/h^2 if they are
-// speeds: knots aren't closer than that allows.
+// Of a limit: rounded times and numbers change a jerk or an acceleration by no more. The times of
+// both ends of a quintic of the duration h are rounded by e each, which changes its jerk j by
+// 9 j e/h. Numbers that are rounded by r change it by 60 r/h^3, and its acceleration by 5.8 r/h^2,
+// if they are positions, and by 24 r/h^2 and 4 r/h if they are speeds: knots aren't closer than
+// that allows.
 constexpr double kMostRoundingOfTimes = 4.5e-5;
 constexpr double kLargestRounding = 1e-3;
 constexpr int kMostPlansOfAverage = 12;  // with one time of the average
@@ -157,7 +158,8 @@ class JerkLimitedSection {
     const double duration = parts.back().time;
     double speed = 0.0;
     for (const AveragedPart& part : parts) speed = std::max(speed, part.speed);
-    double closest = 9.0 * std::max(0.5e-9, kEpsilon * duration) / kMostRoundingOfTimes;
+    double closest =
+        9.0 * std::max(0.5e-9, kEpsilon * (begin_.before + duration)) / kMostRoundingOfTimes;
     // The speed is a difference of places at times that are rounded.
     const double speed_rounding = kEpsilon * duration * speed / time;
     const double sums = std::sqrt(static_cast<double>(parts.size())) * parts.back().distance;
@@ -169,10 +171,13 @@ class JerkLimitedSection {
         moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
       }
       const double rounding = kEpsilon * farthest;
-      const double most = kLargestRounding * limits_[j].jerk;
       if (!moves) continue;
+      const double jerk = kLargestRounding * limits_[j].jerk;
+      const double acceleration =
+          kLargestRounding * std::min(limits_[j].acceleration, limits_[j].deceleration);
       closest = std::max(
-          {closest, std::cbrt(60.0 * rounding / most), std::sqrt(24.0 * speed_rounding / most)});
+          {closest, std::cbrt(60.0 * rounding / jerk), std::sqrt(24.0 * speed_rounding / jerk),
+           std::sqrt(5.8 * rounding / acceleration), 4.0 * speed_rounding / acceleration});
     }
     return closest;
   }
@@ -609,6 +614,13 @@ double JerkLimitedSection::capOf(std::size_t interval, const Reachability& speed
   return cap;
 }
 
+// @param before [s] see TimingStart.
+TimingStart atRest(double before) {
+  TimingStart begin;
+  begin.before = before;
+  return begin;
+}
+
 // The motion between two stops of the path, which may also stop at corners on the way instead of
 // rounding them: if that is faster.
 class StopChoice {
@@ -623,7 +635,7 @@ class StopChoice {
   StopChoice(const Path& path, const std::vector<TimingLimits>& limits, const TimingStart& begin)
       : path_(path), limits_(limits), begin_(begin) {}
 
-  std::vector<Run> fastest() const {
+  std::vector<Run> fastest() {
     JerkLimitedSection section(path_, limits_, begin_);
     std::vector<std::size_t> corners;
     for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
@@ -631,13 +643,14 @@ class StopChoice {
     }
     Run whole{0, path_.size() - 1, section.fastest()};
     if (!whole.plan.possible()) corners.clear();
+    if (!corners.empty()) longest_ = whole.plan.duration();
     return choose(path_, std::move(whole), stoppingAt(std::move(corners)));
   }
 
  private:
   Run planned(const Path& path, std::size_t first, std::size_t last) const {
     const Path part = path.part(first, last);
-    const TimingStart begin = first == 0 ? begin_ : TimingStart{};
+    const TimingStart begin = first == 0 ? begin_ : atRest(begin_.before + longest_);
     return {first, last, JerkLimitedSection(part, limits_, begin).fastest()};
   }
 
@@ -724,6 +737,7 @@ class StopChoice {
   const Path& path_;
   const std::vector<TimingLimits>& limits_;
   const TimingStart& begin_;
+  double longest_ = 0.0;  // [s] no run begins later than that after begin_
 };
 
 // The end of a segment, at rest.
@@ -788,7 +802,7 @@ PathTiming planJerkLimited(const Path& path, const std::vector<TimingLimits>& li
     if (first == last && from.parameter > 1.0 - kNoPart) {  // it begins at a stop
       if (from.speed > 0.0) made.excess = kUnlimited;
       made.knots.push_back(restAtEnd(path, first));
-      from = {};
+      from = atRest(from.before);
       ++first;
       continue;
     }
@@ -802,7 +816,7 @@ PathTiming planJerkLimited(const Path& path, const std::vector<TimingLimits>& li
       appendRun(run.plan, first + run.first, from.ago, made);
       // If the last run is continued, the corner before it may be passed instead.
       if (runs.size() > 1 && &run == &runs.back()) made.settled_ns = settled_ns;
-      from = {};
+      from = atRest(begin.before + static_cast<double>(made.knots.back().time_ns) * 1e-9);
     }
     first = last + 1;
   }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "message_text.h"
+#include "nanoseconds.h"
 #include "path_timing/jerk_limited.h"
 #include "profile/errors.h"
 #include "stepdriver_core/error.h"
@@ -108,9 +109,9 @@ RestOfPath restOf(const std::vector<PathAxis>& axes, const std::vector<double>& 
     const double count = axes[k].countOf(end[k]);
     const double whole = axes[k].restAt(count);
     const double way = std::abs(whole - count);
-    if (way > roundingOf(count)) {
-      rest.duration = std::max(rest.duration, restTime(way, axes[k], count, smooth));
-    }
+    // An axis that stays isn't moved by rounding in the time that another one needs.
+    if (way <= roundingOf(count)) continue;
+    rest.duration = std::max(rest.duration, restTime(way, axes[k], count, smooth));
     rest.positions[k] = axes[k].positionOf(whole);
   }
   return rest;
@@ -147,6 +148,20 @@ BeginOfPath beginOf(const PathSegment& first, const std::vector<PathAxis>& axes,
   return begin;
 }
 
+// After 50 days, a double isn't exact to a nanosecond: the point is where the motion is at its
+// time.
+TrajectoryPoint pointOf(TimingKnot knot) {
+  const double time = static_cast<double>(knot.time_ns) * 1e-9;
+  const double later = static_cast<double>(nanoseconds(time) - knot.time_ns) * 1e-9;
+  for (std::size_t k = 0; later != 0.0 && k < knot.positions.size(); ++k) {
+    const double acceleration = knot.accelerations.empty() ? 0.0 : knot.accelerations[k];
+    knot.positions[k] += later * (knot.velocities[k] + later * acceleration / 2.0);
+    knot.velocities[k] += later * acceleration;
+  }
+  return {time, std::move(knot.positions), std::move(knot.velocities),
+          std::move(knot.accelerations)};
+}
+
 std::vector<TrajectoryPoint> pointsOf(std::vector<TimingKnot> knots,
                                       const std::vector<PathAxis>& axes,
                                       const std::vector<double>& end,
@@ -159,8 +174,7 @@ std::vector<TrajectoryPoint> pointsOf(std::vector<TimingKnot> knots,
         return segmentText(segments[knot.segment].number) + ", rounded at its corners, at";
       });
     }
-    points.push_back({static_cast<double>(knot.time_ns) * 1e-9, std::move(knot.positions),
-                      std::move(knot.velocities), std::move(knot.accelerations)});
+    points.push_back(pointOf(std::move(knot)));
   }
   RestOfPath rest = restOf(axes, end, !points.back().accelerations.empty());
   if (rest.duration > 0.0) {

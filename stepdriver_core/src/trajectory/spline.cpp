@@ -14,9 +14,10 @@
 namespace stepdriver::motion {
 namespace {
 
-// If the acceleration of a quintic keeps a limit L, its fourth derivative is at most 96 L/T^2
-// (Markov's inequality for the second derivative of a cubic), so with this many cubics the error of
-// the acceleration is below kQuinticAccelerationError L.
+// If the acceleration of a quintic keeps a limit L, its fourth derivative is at most 96 L/T^2, and
+// if its velocity keeps a limit L, at most 1536 L/T^3 (Markov's inequality for the derivatives of a
+// cubic and of a polynomial of the fourth degree), so with this many cubics the errors are below
+// kQuinticLimitError L.
 constexpr double kMostCubics = 64.0;
 
 Piece line(DoubleDouble duration, DoubleDouble from, DoubleDouble to) {
@@ -58,19 +59,24 @@ bool exceeds(const std::vector<Piece>& pieces, std::size_t from, double accelera
 }
 
 void appendQuintic(std::vector<Piece>& pieces, const SplineSegment& segment,
-                   double most_acceleration) {
+                   const SplineLimits& limits) {
   const Quintic curve = segment.quintic();
   requireReach(curve.reach(), segment.index);
   const double fourth = curve.largestFourthDerivative();
   const double duration = segment.duration().value();
   const std::size_t before = pieces.size();
-  constexpr double kAnySpeed = std::numeric_limits<double>::infinity();
+  // A limit that an error no longer takes the cubics above.
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  const auto counts = [](double limit, double error) {
+    return error <= kQuinticLimitError * limit ? kAny : limit;
+  };
   for (double count = cubicsFor(1.0, fourth, kQuinticError);; count *= 2.0) {
     appendCubics(pieces, segment, curve, count);
-    const double h = 1.0 / count;
-    const double error = h * h / 12.0 * fourth / (duration * duration);
-    if (error <= kQuinticAccelerationError * most_acceleration || count >= kMostCubics) break;
-    if (!exceeds(pieces, before, most_acceleration, kAnySpeed)) break;
+    const double h = duration / count;
+    const double jolt = fourth / std::pow(duration, 4.0);
+    const double acceleration = counts(limits.acceleration, h * h / 12.0 * jolt);
+    const double speed = counts(limits.speed, std::sqrt(3.0) / 216.0 * h * h * h * jolt);
+    if (count >= kMostCubics || !exceeds(pieces, before, acceleration, speed)) break;
     pieces.resize(before);
   }
 }
@@ -179,7 +185,7 @@ void append(std::vector<Piece>& pieces, const SplineSegment& segment, const Spli
       appendCubic(pieces, segment);
       break;
     case SegmentKind::kQuintic:
-      appendQuintic(pieces, segment, limits.acceleration);
+      appendQuintic(pieces, segment, limits);
       break;
   }
   if (std::isfinite(limits.gentler_beyond)) makeGentler(pieces, before, segment, limits);

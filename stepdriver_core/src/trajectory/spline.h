@@ -28,9 +28,9 @@ constexpr double kFarthest = 140737488355328.0;  // 2^47
 /// [microsteps] The largest deviation of the cubics from the quintic that they replace.
 constexpr double kQuinticError = 0.01;
 
-/// The part of a limit by which the acceleration of the cubics may exceed it, if that of their
-/// quintic doesn't.
-constexpr double kQuinticAccelerationError = 0.0025;
+/// The part of a limit by which the acceleration or the velocity of the cubics may exceed it, if
+/// that of their quintic doesn't.
+constexpr double kQuinticLimitError = 0.0025;
 
 /// The limits of the axis, which the curve of a trajectory keeps if its points allow that.
 struct SplineLimits {
@@ -58,9 +58,8 @@ struct SplineLimits {
 /// that makes this kQuinticError or less; apart from this, a step comes when the curve crosses a
 /// half-step line. Position and velocity are continuous; the velocity is off by at most sqrt(3)
 /// h^3/216 max|p''''|, the acceleration by h^2/12 max|p''''| <= 32 kQuinticError/h^2, and between
-/// two of the cubics it jumps by h^3/15 |p'''''|. If that takes a cubic above the limit of the
-/// acceleration, n is doubled until it doesn't, or until h^2/12 max|p''''| is
-/// kQuinticAccelerationError of it.
+/// two of the cubics it jumps by h^3/15 |p'''''|. If that takes a cubic above a limit, n is doubled
+/// until it doesn't, or until that error is kQuinticLimitError of it.
 ///
 /// A sender's acceleration may jump between two points, as at the corners of a trapezoid of
 /// velocity. The quintic through its samples then overshoots by up to 37 %, and the cubic by up to

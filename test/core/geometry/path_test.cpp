@@ -333,6 +333,33 @@ TEST(Path, TakesABezierWithAControlPointAtItsEnd) {
   }
 }
 
+// An axis that stands still on the next segment would otherwise move by a rounding.
+TEST(Path, HasTheSamePlaceAtBothSidesOfACorner) {
+  std::mt19937 random(3);
+  for (int i = 0; i < 300; ++i) {
+    const test::RandomPath made = test::randomPath(random);
+    for (const Continuity continuity : {Continuity::kDirection, Continuity::kCurvature}) {
+      const Path path = made.path(continuity);
+      PathPoint begin;
+      PathPoint end;
+      PathPoint near;
+      for (std::size_t k = 0; k < path.size(); ++k) {
+        path.evaluateGiven(k, 0.0, begin);
+        path.evaluateGiven(k, 1.0, end);
+        EXPECT_EQ(begin.position, k == 0 ? made.start : made.segments[k - 1].end);
+        EXPECT_EQ(end.position, made.segments[k].end);
+        // Nor does it jump there.
+        path.evaluateGiven(k, 1.0 - 1e-15, near);
+        EXPECT_LE(distance(near.position, end.position), 1e-9) << "segment " << k;
+        if (k + 1 == path.size()) continue;
+        path.evaluate(k, 1.0, end);
+        path.evaluate(k + 1, 0.0, begin);
+        EXPECT_EQ(begin.position, end.position) << "segment " << k;
+      }
+    }
+  }
+}
+
 TEST(Path, KnowsTheRangeOfEachAxis) {
   std::mt19937 random(7);
   for (int i = 0; i < 200; ++i) {

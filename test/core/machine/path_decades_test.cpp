@@ -44,7 +44,8 @@ struct Drawn {
 
 class Decades {
  public:
-  explicit Decades(unsigned seed) : random_(seed) {}
+  // @param edges how often a limit is one of the two that the reader accepts.
+  Decades(unsigned seed, double edges) : random_(seed), edges_(edges) {}
 
   double number(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
@@ -77,9 +78,8 @@ class Decades {
   }
 
  private:
-  // One of the edges now and then.
   double edge(double low, double high) {
-    if (often(0.1)) return std::pow(10.0, often(0.5) ? low : high);
+    if (often(edges_)) return std::pow(10.0, often(0.5) ? low : high);
     return decades(low, high);
   }
 
@@ -116,6 +116,7 @@ class Decades {
   }
 
   std::mt19937 random_;
+  double edges_;
   Point place_{};
 };
 
@@ -231,8 +232,8 @@ void expectGoodSteps(const Drawn& drawn, const PlannedPath& path) {
   }
 }
 
-void followMany(bool jerk, bool fed, int paths) {
-  Decades decades(static_cast<unsigned>(7 + 2 * jerk + fed));
+void followMany(bool jerk, bool fed, int paths, double edges = 0.1) {
+  Decades decades(static_cast<unsigned>(7 + 2 * jerk + fed), edges);
   int followed = 0;
   for (int i = 0; i < paths; ++i) {
     const Drawn drawn = decades.path(jerk, fed);
@@ -262,6 +263,12 @@ TEST(PathDecades, AreFollowedWithoutAJerkLimit) { followMany(false, false, 1000)
 TEST(PathDecades, AreFollowedWithAJerkLimit) { followMany(true, false, 300); }
 TEST(PathDecades, AreFollowedIfTheyAreFed) { followMany(false, true, 300); }
 TEST(PathDecades, AreFollowedIfTheyAreFedWithAJerkLimit) { followMany(true, true, 100); }
+// An axis with the lowest limits may stand still while another one moves with the highest ones.
+TEST(PathDecades, AreFollowedAtTheEdgesOfAllLimits) {
+  followMany(false, false, 1000, 0.7);
+  followMany(true, false, 500, 0.7);
+  followMany(true, true, 100, 0.7);
+}
 
 }  // namespace
 }  // namespace stepdriver

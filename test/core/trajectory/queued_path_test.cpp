@@ -108,7 +108,7 @@ void expectJerkWithin(const Profile& profile, const PathAxis& axis, double aroun
 }
 
 void expectWithin(const Profile& profile, const PathAxis& axis, double seam) {
-  const double more = axis.limits.jerk > 0.0 ? 1e-3 + motion::kQuinticAccelerationError : 1e-3;
+  const double more = axis.limits.jerk > 0.0 ? 1e-3 + motion::kQuinticLimitError : 1e-3;
   for (const motion::Piece& piece : profile.pieces()) {
     for (const motion::DoubleDouble t : {motion::DoubleDouble(), piece.duration}) {
       ASSERT_LE(std::abs(piece.velocityAt(t).value()), axis.limits.max_speed * (1.0 + 1e-6));

@@ -234,10 +234,37 @@ TEST(Spline, KeepsTheAccelerationThatItsQuinticKeeps) {
   ASSERT_EQ(unbounded.size(), 1U);
   EXPECT_NEAR(last(unbounded.back()), 1.1 * kMost, 1e-6);
   const std::vector<Piece> bounded = first(kMost);
-  EXPECT_LE(last(bounded.back()), (1.0 + kQuinticAccelerationError) * kMost);
+  EXPECT_LE(last(bounded.back()), (1.0 + kQuinticLimitError) * kMost);
   EXPECT_LE(bounded.size(), 32U);
   EXPECT_EQ(first(1.2 * kMost).size(), 1U) << "it is divided only if it exceeds the limit";
   EXPECT_LE(first(1e-6 * kMost).size(), 64U) << "what exceeds it itself isn't divided without end";
+}
+
+// A ramp that ends at its speed halfway: the quintic stays below 1, one cubic reaches 1.03.
+TEST(Spline, KeepsTheSpeedThatItsQuinticKeeps) {
+  constexpr double kSpeed = 1e-3;
+  const std::vector<Waypoint> waypoints = {{10'000'000, 4.18e-7, 0.6854e-3, 0.5978},
+                                           {12'012'000, 2.2985e-6, 0.9843e-3, 0.0},
+                                           {kSecond, 0.0005, 0.0, 0.0}};
+  const auto fastest = [&](double most) {
+    const Profile curve =
+        planSpline(0, {}, waypoints, {std::numeric_limits<double>::infinity(), most});
+    double speed = 0.0;
+    double time = 0.0;
+    for (const Piece& piece : curve.pieces()) {
+      const double t = piece.duration.value();
+      if (time > 0.0099 && time < 0.0120) {
+        for (int k = 0; k <= 100; ++k) {
+          const double at = t * k / 100.0;
+          speed = std::max(speed, std::abs(piece.velocityAt(DoubleDouble(at)).value()));
+        }
+      }
+      time += t;
+    }
+    return speed;
+  };
+  EXPECT_GT(fastest(std::numeric_limits<double>::infinity()), 1.01 * kSpeed);
+  EXPECT_LE(fastest(kSpeed), (1.0 + kQuinticLimitError) * kSpeed);
 }
 
 TEST(Spline, StaysOnItsWaypointsOver10000) {
