@@ -23,8 +23,14 @@ Item requests(int client, std::size_t after, const std::string& name,
   return {0, client, after, std::make_shared<const Act>(act)};
 }
 
+/// On the port that writes now, and on one that takes steps ahead of time.
 void expectGood(const Schedule& schedule) {
   EXPECT_EQ(Participants(schedule).run(), std::vector<std::string>());
+  for (const pulse::Nanoseconds horizon : {1'000'000, 50'000'000}) {
+    Schedule ahead = schedule;
+    ahead.ahead = Ahead{horizon, 0, 200'000};
+    EXPECT_EQ(Participants(ahead).run(), std::vector<std::string>()) << "horizon " << horizon;
+  }
 }
 
 TEST(FoundSchedules, AMoveThatComesWhileAnAxisIsPutToSleepDoesNotStep) {

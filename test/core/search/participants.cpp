@@ -1,5 +1,7 @@
 #include "search/participants.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -481,6 +483,8 @@ bool Participants::step() {
 void Participants::go(Who who) {
   act(who);
   answerEmergencyStops();
+  constexpr std::size_t kCheckedOnceIn = 101;
+  if (steps_ % kCheckedOnceIn == 0) checkLive();
 }
 
 void Participants::answerEmergencyStops() {
@@ -954,7 +958,7 @@ void Participants::checkHull(std::size_t axis) {
   // Until they are taken back, the steps of other motors that it shares go out.
   const auto& shared = configs_[axis].kinematics;
   for (std::size_t i = 0; port_ && shared && i < shared->axes.size(); ++i) {
-    if (steps_failed_[i]) return;
+    if (steps_failed_[i] || chip_broke_[i]) return;
   }
   const std::string broken = hulls_[axis].broken();
   if (!broken.empty()) oracle_.complain(configs_[axis].name + " " + broken + " microsteps");
@@ -1493,6 +1497,37 @@ bool Participants::atRest() {
                      [](const auto& move) { return move.second.outcome->get().has_value(); });
 }
 
+// In motion too: the counts are those of the edges that have gone out, and the plan is at the same
+// place.
+void Participants::checkLive() {
+  for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) {
+    if (!steps_failed_[axis] && configs_[axis].kinematics == nullptr) checkLive(axis);
+  }
+}
+
+void Participants::checkLive(std::size_t axis) {
+  const config::AxisConfig& config = configs_[axis];
+  const pulse::ChannelState live = engine_->channel(static_cast<int>(axis));
+  const sim::RigAxisReport report = rig_.report(config.name);
+  const std::int64_t seen = report.pulses_forward - report.pulses_backward;
+  const std::int64_t told = seen - (port_ ? port_->untold(axis) : 0);
+  if (live.epoch == 0 && live.count + live.lags[0] != told) {
+    oracle_.complain(fmt::format("{} moves: the engine stands at {}, the rig has told {}",
+                                 config.name, live.count + live.lags[0], told));
+  }
+  const auto snapshot = controller_->snapshot();
+  const machine::AxisSnapshot& now = snapshot->axes.at(axis);
+  const pulse::Nanoseconds time = clock_.now() - engine_->state().slipped;
+  const axis::AxisState state = machine::stateOf(now, live, time, time);
+  // The engine and the board may be late, and a step is at the middle between two counts.
+  const auto late = static_cast<double>(takingBack(schedule_) + kLatestPass + kMillisecond) * 1e-9;
+  const double most = 2.0 / now.steps_per_unit + config.max_speed * late;
+  if (std::abs(state.planned - state.position) > most) {
+    oracle_.complain(fmt::format("{} stands at {} m, but is planned to be at {} m", config.name,
+                                 state.position, state.planned));
+  }
+}
+
 void Participants::checkCounts(const std::string& when) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) checkCount(axis, when);
 }
@@ -1721,7 +1756,10 @@ std::vector<std::string> Participants::run() {
     return !clients_[0].waits_for_stops && !clients_[1].waits_for_stops &&
            controller_->snapshot()->axes.front().state.held;
   };
-  if (!playUntil(played, kLongestCall) && !held() && !schedule_.may_last) {
+  // An item may wait for the slow motion of the one before it.
+  const auto longest = kLongestCall * static_cast<pulse::Nanoseconds>(
+                                          std::max<std::size_t>(1, schedule_.items.size()));
+  if (!playUntil(played, longest) && !held() && !schedule_.may_last) {
     for (const auto& [id, asked] : open_) oracle_.complain(asked.name + " isn't answered");
     for (const Client& client : clients_) {
       if (client.waits_for_stops) oracle_.complain("the emergency stop isn't answered");

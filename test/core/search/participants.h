@@ -296,6 +296,8 @@ class Participants : private machine::ShellCore::Host {
   void widenHull(const Ask& asked, std::size_t axis);
   void checkHull(std::size_t axis);
   /// @}
+  void checkLive();
+  void checkLive(std::size_t axis);
   void checkCounts(const std::string& when);
   void checkCount(std::size_t axis, const std::string& when);
   void checkPowered(std::size_t axis, pulse::Nanoseconds now);

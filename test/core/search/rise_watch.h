@@ -14,8 +14,8 @@
 
 namespace stepdriver::search {
 
-/// What all edges of some runs were, in one number (FNV-1a): it tells whether a change has moved any
-/// of them.
+/// What all edges of some runs were, in one number (FNV-1a): it tells whether a change has moved
+/// any of them.
 class EdgeHash {
  public:
   void add(std::uint64_t value) {

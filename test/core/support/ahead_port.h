@@ -123,7 +123,8 @@ class AheadPort final : public pulse::StepPort {
     }
     if (told_.size() != before) clock_.wake();
   }
-  /// [microsteps] The steps that have gone out, of which the engine hasn't heard.
+  /// [microsteps] The steps of the channel's first motor that have gone out, of which the engine
+  /// hasn't heard.
   std::int64_t untold(std::size_t channel) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return tracks_[channel].untold;
@@ -156,6 +157,10 @@ class AheadPort final : public pulse::StepPort {
     Nanoseconds taken_back = pulse::kNever;  // when that arrives
   };
 
+  static int ownWay(const Step& step) {
+    return (step.still & pulse::motorBit(0)) == 0 ? step.direction : 0;
+  }
+
   static Nanoseconds dueOf(const Track& track) {
     if (track.pin.busy) return track.train.fallDue();
     if (track.open.empty()) return pulse::kNever;
@@ -183,7 +188,7 @@ class AheadPort final : public pulse::StepPort {
       if ((step.still & pulse::motorBit(i)) != 0) track.state.lags.at(i) -= step.direction;
     }
     track.out = Played{step, now};
-    track.untold += step.direction;
+    track.untold += ownWay(step);
     if (!track.pin.busy) tellPlayed(channel);
   }
 
@@ -192,7 +197,7 @@ class AheadPort final : public pulse::StepPort {
     told_.emplace_back([this, channel, out = *tracks_[channel].out](Listener& listener) {
       {
         const std::lock_guard<std::mutex> lock(mutex_);
-        tracks_[channel].untold -= out.step.direction;
+        tracks_[channel].untold -= ownWay(out.step);
       }
       listener.played(channel, out.step.direction, out.step.still, out.time);
     });
