@@ -83,6 +83,27 @@ TEST(Screen, FillsTheWindowAndNeverMore) {
   }
 }
 
+TEST(Screen, ShowsOutputsAndInputsWithTheAgeOfTheirStates) {
+  Session session = sessionWith({axisView("x")});
+  EXPECT_EQ(screenText(session, 24, 80).find("outputs"), std::string::npos);
+  EXPECT_EQ(screenText(session, 24, 80).find("t switch"), std::string::npos);
+  session.driver().updateIo({{"lamp", false, {}, "", ""}, {"pen", true, -3.5, "", ""}},
+                            {{"paper", true, -130.0, ""}});
+  const std::string screen = screenText(session, 24, 80);
+  for (const char* words : {"outputs    > lamp: off since the start    pen: on 3 s",
+                            "inputs    paper: active 2 min", "n next output", "t switch lamp"}) {
+    EXPECT_TRUE(shows(screen, words));
+  }
+  EXPECT_TRUE(shows(screenText(session, 24, 80, 2.0), "pen: [on 5 s]")) << "its state is old";
+  session.driver().updateIo({{"pen", false, 0.0, "it was on for 600 s, its max_on_s", "I/O error"}},
+                            {{"paper", true, {}, "the chip is gone"}});
+  const std::string wrong = screenText(session, 24, 80);
+  for (const char* words : {"pen: it was on for 600 s, its max_on_s", "OUTPUT pen: I/O error",
+                            "INPUT paper: the chip is gone"}) {
+    EXPECT_TRUE(shows(wrong, words));
+  }
+}
+
 TEST(Screen, SaysWhatASmallWindowCannotShow) {
   Session session = sessionWith(sixAxes());
   session.press({'6'}, 0.0);

@@ -53,6 +53,38 @@ TEST(Session, RepeatsProlongAJog) {
   EXPECT_TRUE(session.jog().active());
 }
 
+TEST(Session, SwitchesTheChosenOutputToTheOtherState) {
+  Session session = sessionWith({axisView("x")});
+  session.driver().updateIo({{"lamp", false, {}, "", ""}, {"pen", true, 0.0, "", ""}}, {});
+  const auto switched = [&](const Orders& orders) {
+    if (orders.calls.size() != 1) return std::string("no call");
+    const Call& call = orders.calls.front();
+    return call.name() + (call.on ? " on" : " off");
+  };
+  EXPECT_EQ(switched(session.press({'t'}, 0.0)), "lamp: switch on");
+  EXPECT_EQ(switched(session.press({'n', 't'}, 0.0)), "pen: switch off");
+  EXPECT_EQ(switched(session.press({'t'}, 0.0)), "no call") << "the last one isn't answered";
+  EXPECT_TRUE(said(session, "pen: switch: not sent again"));
+  EXPECT_EQ(session.press({'n'}, 0.0).calls.size(), 0U);
+  EXPECT_EQ(session.chosenOutput()->name, "lamp") << "after the last one comes the first";
+  // The state is the driver's: an answer alone doesn't change it.
+  Call answered{Call::What::kSetOutput, {}};
+  answered.output = "lamp";
+  session.answered(answered, true, "lamp is on");
+  EXPECT_FALSE(session.chosenOutput()->on);
+  session.driver().updateIo({{"lamp", true, 0.0, "", ""}, {"pen", true, 0.0, "", ""}}, {});
+  EXPECT_EQ(switched(session.press({'t'}, 0.0)), "lamp: switch off");
+}
+
+TEST(Session, SwitchesNoOutputThatIsNotThereOrWhoseStateIsOld) {
+  Session session = sessionWith({axisView("x")});
+  EXPECT_TRUE(session.press({'n', 't'}, 0.0).calls.empty());
+  EXPECT_TRUE(said(session, "the driver has no output with a name"));
+  session.driver().updateIo({{"pen", true, 0.0, "", ""}}, {});
+  EXPECT_TRUE(session.press({'t'}, 2.0).calls.empty());
+  EXPECT_TRUE(said(session, "pen isn't switched: the driver's state isn't live"));
+}
+
 TEST(Session, JogsOnlyAnAxisThatIsEnabledAndLiveAndWithoutAFault) {
   AxisView disabled = axisView("x");
   disabled.enabled = false;

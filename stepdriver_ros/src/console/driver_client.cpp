@@ -8,6 +8,7 @@
 #include <stepdriver/HomeAxes.h>
 #include <stepdriver/Jog.h>
 #include <stepdriver/MoveTo.h>
+#include <stepdriver/SetOutput.h>
 #include <stepdriver/SetPosition.h>
 #include <stepdriver/SpeedOverride.h>
 
@@ -78,6 +79,12 @@ client::Answer carryOutCall(const std::string& driver, const Call& call, const T
       request.wait = true;
       return client::askService<HomeAxes>(driver + "/home", request);
     }
+    case Call::What::kSetOutput: {
+      SetOutput::Request request;
+      request.name = call.output;
+      request.on = call.on;
+      return client::askService<SetOutput>(driver + "/set_output", request);
+    }
     case Call::What::kHold:
       return client::askService<std_srvs::Trigger>(driver + "/hold");
     case Call::What::kResume:
@@ -113,6 +120,9 @@ DriverClient::DriverClient(ros::NodeHandle node, Session& session,
   endstops_ = node.subscribe<Endstops>(
       driver_ + "/endstops", kQueued,
       [this](const Endstops::ConstPtr& message) { onMessage(*message); }, {}, hints);
+  io_ = node.subscribe<IoStates>(
+      driver_ + "/io_states", kQueued,
+      [this](const IoStates::ConstPtr& message) { onMessage(*message); }, {}, hints);
   log_ = node.subscribe<rosgraph_msgs::Log>(
       "/rosout", 10 * kQueued,
       [this](const rosgraph_msgs::Log::ConstPtr& message) { onMessage(*message); });
@@ -225,6 +235,25 @@ void DriverClient::onMessage(const Endstops& endstops) {
   for (std::size_t i = 0; i < endstops.name.size(); ++i) {
     session_.driver().updateEndstops(endstops.name[i], endstops.min[i] != 0, endstops.max[i] != 0);
   }
+}
+
+void DriverClient::onMessage(const IoStates& states) {
+  const double to_steady = steadyNow() - ros::Time::now().toSec();
+  const auto changed = [to_steady](const ros::Time& stamp) {
+    return stamp.isZero() ? std::optional<double>() : stamp.toSec() + to_steady;
+  };
+  std::vector<OutputView> outputs;
+  for (std::size_t i = 0; i < states.output_name.size(); ++i) {
+    outputs.push_back({states.output_name[i], states.output_on[i] != 0,
+                       changed(states.output_changed[i]), states.output_note[i],
+                       states.output_error[i]});
+  }
+  std::vector<InputView> inputs;
+  for (std::size_t i = 0; i < states.input_name.size(); ++i) {
+    inputs.push_back({states.input_name[i], states.input_active[i] != 0,
+                      changed(states.input_changed[i]), states.input_error[i]});
+  }
+  session_.driver().updateIo(std::move(outputs), std::move(inputs));
 }
 
 // Jogs have no answer: only the driver's log says why one was refused.

@@ -6,6 +6,7 @@
 #include <rosgraph_msgs/Log.h>
 #include <stepdriver/AxisStates.h>
 #include <stepdriver/Endstops.h>
+#include <stepdriver/IoStates.h>
 
 #include <future>
 #include <map>
@@ -46,6 +47,7 @@ class DriverClient {
 
   void onMessage(const AxisStates& states);
   void onMessage(const Endstops& endstops);
+  void onMessage(const IoStates& states);
   void onMessage(const rosgraph_msgs::Log& log);
   void configure(const DriverParameters& parameters);
   void noticeTheDriver();
@@ -64,6 +66,7 @@ class DriverClient {
   ros::Publisher jog_;
   ros::Subscriber states_;
   ros::Subscriber endstops_;
+  ros::Subscriber io_;
   ros::Subscriber log_;
 };
 

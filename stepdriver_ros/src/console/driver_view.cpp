@@ -35,6 +35,11 @@ void DriverView::forgetEndstops() {
   for (AxisView& view : axes_) takeSwitches(view);
 }
 
+void DriverView::updateIo(std::vector<OutputView> outputs, std::vector<InputView> inputs) {
+  outputs_ = std::move(outputs);
+  inputs_ = std::move(inputs);
+}
+
 void DriverView::takeSwitches(AxisView& axis) const {
   axis.switches_known = false;
   for (const Switches& switches : switches_) {

@@ -30,6 +30,23 @@ struct AxisView {
   bool max_active = false;
 };
 
+/// The state of an output with a name.
+struct OutputView {
+  std::string name;
+  bool on = false;
+  std::optional<double> changed;  ///< [s] when it was switched; empty: not since the start
+  std::string note;               ///< why it was switched off by itself
+  std::string error;              ///< why `on` isn't certain
+};
+
+/// The state of an input with a name.
+struct InputView {
+  std::string name;
+  bool active = false;
+  std::optional<double> changed;  ///< [s] when its level changed; empty: not since the start
+  std::string error;              ///< why it can't be read
+};
+
 /// What the console knows about the driver: the configuration of its axes, and their last state. It
 /// has no clock: times are seconds on any clock that never goes back.
 class DriverView {
@@ -46,6 +63,11 @@ class DriverView {
   /// They are published only when they change, so those of a driver that has gone are meaningless.
   void forgetEndstops();
 
+  /// The outputs and inputs with a name, which come at each change.
+  void updateIo(std::vector<OutputView> outputs, std::vector<InputView> inputs);
+
+  const std::vector<OutputView>& outputs() const { return outputs_; }
+  const std::vector<InputView>& inputs() const { return inputs_; }
   const std::vector<AxisView>& axes() const { return axes_; }
   /// @return nullptr if there is no such axis.
   const AxisView* axis(const std::string& name) const;
@@ -71,6 +93,8 @@ class DriverView {
   std::vector<config::AxisConfig> configs_;
   std::vector<AxisView> axes_;
   std::vector<Switches> switches_;
+  std::vector<OutputView> outputs_;
+  std::vector<InputView> inputs_;
   std::optional<double> updated_;
   int updates_ = 0;
 };

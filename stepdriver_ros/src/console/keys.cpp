@@ -44,6 +44,8 @@ const std::map<Key, Command>& commands() {
       {'o', {Action::kDisableAll}},
       {'h', {Action::kHome}},
       {'a', {Action::kHomeAll}},
+      {'n', {Action::kNextOutput}},
+      {'t', {Action::kSwitchOutput}},
       {'?', {Action::kHelp}},
       {'q', {Action::kQuit}},
       {kKeyCtrlC, {Action::kQuit}},

@@ -39,6 +39,8 @@ enum class Action {
   kDisableAll,
   kHome,
   kHomeAll,
+  kNextOutput,
+  kSwitchOutput,
   kHelp,
   kQuit,
 };

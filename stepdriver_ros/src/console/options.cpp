@@ -41,6 +41,7 @@ restores the terminal when it ends. Nothing moves when it starts, and a disabled
   h, a              home the axis, home all
   p, c              hold all axes, resume
   [ ]               slow down, speed up all motions by 10 %
+  n, t              choose the next output, switch it on or off
   r                 recover from faults and an emergency stop; this moves nothing
   ?, q              all keys; quit
 

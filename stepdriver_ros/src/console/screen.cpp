@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "axis_table.h"
 #include "wrapped.h"
@@ -140,6 +142,64 @@ std::vector<Row> settingRows(const Session& session, int columns) {
                 columns);
 }
 
+/// As many of the texts in each row as fit.
+std::vector<Row> packed(const std::vector<std::string>& texts, int columns) {
+  const std::string gap(4, ' ');
+  std::vector<Row> rows;
+  std::string line;
+  for (const std::string& text : texts) {
+    if (line.size() + gap.size() + text.size() > static_cast<std::size_t>(columns)) {
+      if (!line.empty()) append(rows, rowsOf(line, columns));
+      line.clear();
+    }
+    line += (line.empty() ? "" : gap) + text;
+  }
+  append(rows, rowsOf(line, columns));
+  return rows;
+}
+
+std::string ageText(const std::optional<double>& changed, double now) {
+  if (!changed) return "since the start";
+  const double age = std::max(now - *changed, 0.0);
+  if (age < 60.0) return fmt::format("{:.0f} s", std::floor(age));
+  if (age < 3600.0) return fmt::format("{:.0f} min", std::floor(age / 60.0));
+  return fmt::format("{:.0f} h", std::floor(age / 3600.0));
+}
+
+/// The outputs and inputs with a name: "> pen: on 3 s" is the output that `t` switches. Old states
+/// are in brackets.
+std::vector<Row> ioRows(const Session& session, int columns, double now) {
+  const DriverView& driver = session.driver();
+  const bool live = driver.live(now);
+  const auto text = [&](const std::string& name, const char* state, const auto& changed) {
+    return fmt::format(live ? "{}: {} {}" : "{}: [{} {}]", shortName(name, kShortName), state,
+                       ageText(changed, now));
+  };
+  std::vector<Row> rows;
+  const OutputView* const chosen = session.chosenOutput();
+  std::vector<std::string> texts{"outputs"};
+  for (const OutputView& output : driver.outputs()) {
+    texts.push_back((output.name == chosen->name ? "> " : "") +
+                    text(output.name, output.on ? "on" : "off", output.changed));
+  }
+  if (texts.size() > 1) append(rows, packed(texts, columns));
+  texts = {"inputs"};
+  for (const InputView& input : driver.inputs()) {
+    texts.push_back(text(input.name, input.active ? "active" : "inactive", input.changed));
+  }
+  if (texts.size() > 1) append(rows, packed(texts, columns));
+  for (const OutputView& output : driver.outputs()) {
+    if (!output.note.empty()) append(rows, rowsOf(output.name + ": " + output.note, columns));
+    if (output.error.empty()) continue;
+    append(rows, rowsOf("OUTPUT " + output.name + ": " + output.error, columns, true));
+  }
+  for (const InputView& input : driver.inputs()) {
+    if (input.error.empty()) continue;
+    append(rows, rowsOf("INPUT " + input.name + ": " + input.error, columns, true));
+  }
+  return rows;
+}
+
 std::vector<Row> promptRows(const Session& session, int columns) {
   if (const auto& axis = session.zeroAsked()) {
     return rowsOf(fmt::format("Set the position of {} to 0? Its soft limits then count from here. "
@@ -162,31 +222,29 @@ std::vector<Row> promptRows(const Session& session, int columns) {
                 columns, true);
 }
 
-/// As many of the texts in each row as fit.
-std::vector<Row> packed(const std::vector<std::string>& texts, int columns) {
-  const std::string gap(4, ' ');
-  std::vector<Row> rows;
-  std::string line;
-  for (const std::string& text : texts) {
-    if (line.size() + gap.size() + text.size() > static_cast<std::size_t>(columns)) {
-      if (!line.empty()) append(rows, rowsOf(line, columns));
-      line.clear();
-    }
-    line += (line.empty() ? "" : gap) + text;
-  }
-  append(rows, rowsOf(line, columns));
-  return rows;
-}
-
 std::vector<Row> helpRows(const Session& session, int columns) {
   const std::string axis =
       session.chosen().empty() ? "the axis" : shortName(session.chosen(), kShortName);
-  std::vector<Row> rows = packed(
-      {"up down 1-9 choose an axis", "e enable " + axis, "d disable " + axis,
-       "left right jog slowly while held", "shift+left shift+right < > jog fast", "- + one step",
-       "i step size", "g go to a position", "z set zero", "h home " + axis, "a home all",
-       "m o all motors on, off", "p hold all", "c resume", "[ ] speed", "r recover"},
-      columns);
+  std::vector<std::string> texts = {"up down 1-9 choose an axis",
+                                    "e enable " + axis,
+                                    "d disable " + axis,
+                                    "left right jog slowly while held",
+                                    "shift+left shift+right < > jog fast",
+                                    "- + one step",
+                                    "i step size",
+                                    "g go to a position",
+                                    "z set zero",
+                                    "h home " + axis,
+                                    "a home all",
+                                    "m o all motors on, off",
+                                    "p hold all",
+                                    "c resume",
+                                    "[ ] speed",
+                                    "r recover"};
+  if (const OutputView* const output = session.chosenOutput()) {
+    texts.insert(texts.end(), {"n next output", "t switch " + shortName(output->name, kShortName)});
+  }
+  std::vector<Row> rows = packed(texts, columns);
   if (!session.showsHelp()) return rows;
   append(rows,
          packed({", . jog slowly too", "k j tab choose an axis too", "= one step too"}, columns));
@@ -260,6 +318,7 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
   const std::vector<Row> titles = body.fit({table.titles});
   const std::vector<Row> pending = body.fit(pendingRows(session, columns, now));
   const std::vector<Row> settings = body.fitWhole(settingRows(session, columns), 1);
+  const std::vector<Row> io = body.fitWhole(ioRows(session, columns, now), 1);
   std::vector<Row> help = takeHelp(session, columns, body);
   if (!help.empty()) {
     help.insert(help.begin(), Row{std::string(columns, '-'), false});
@@ -273,6 +332,7 @@ std::vector<Row> draw(const Session& session, int rows, int columns, double now)
   append(screen, hidden);
   append(screen, faults);
   append(screen, settings);
+  append(screen, io);
   append(screen, prompt);
   append(screen, messages);
   append(screen, pending);

@@ -61,6 +61,8 @@ std::string Call::name() const {
       case What::kHome:
       case What::kHomeAll:
         return "home";
+      case What::kSetOutput:
+        return "switch";
       case What::kHold:
         return "hold";
       case What::kResume:
@@ -74,6 +76,7 @@ std::string Call::name() const {
     }
     return "recover";
   };
+  if (what == What::kSetOutput) return output + ": " + word();
   return (axis.empty() ? "all axes" : axis) + ": " + word();
 }
 
@@ -198,6 +201,12 @@ void Session::obey(const Command& command, double now, Orders& orders) {
     case Action::kHomeAll:
       home(command.action == Action::kHomeAll, now, orders);
       break;
+    case Action::kNextOutput:
+      chooseNextOutput();
+      break;
+    case Action::kSwitchOutput:
+      switchOutput(now, orders);
+      break;
     case Action::kHelp:
       help_ = !help_;
       break;
@@ -241,6 +250,35 @@ void Session::home(bool all, double now, Orders& orders) {
   } else {
     call({all ? Call::What::kHomeAll : Call::What::kHome, all ? "" : chosen_}, now, orders);
   }
+}
+
+const OutputView* Session::chosenOutput() const {
+  const std::vector<OutputView>& outputs = driver_.outputs();
+  const auto found = std::find_if(outputs.begin(), outputs.end(), [this](const OutputView& output) {
+    return output.name == chosen_output_;
+  });
+  if (found != outputs.end()) return &*found;
+  return outputs.empty() ? nullptr : &outputs.front();
+}
+
+void Session::chooseNextOutput() {
+  const OutputView* const chosen = chosenOutput();
+  if (chosen == nullptr) return messages_.say("the driver has no output with a name");
+  const std::vector<OutputView>& outputs = driver_.outputs();
+  const auto index = static_cast<std::size_t>(chosen - outputs.data());
+  chosen_output_ = outputs[(index + 1) % outputs.size()].name;
+}
+
+void Session::switchOutput(double now, Orders& orders) {
+  const OutputView* const chosen = chosenOutput();
+  if (chosen == nullptr) return messages_.say("the driver has no output with a name");
+  if (!driver_.live(now)) {
+    return messages_.say(chosen->name + " isn't switched: the driver's state isn't live");
+  }
+  Call change{Call::What::kSetOutput, {}};
+  change.output = chosen->name;
+  change.on = !chosen->on;
+  call(std::move(change), now, orders);
 }
 
 void Session::openPrompt(double now) {

@@ -22,6 +22,7 @@ struct Call {
     kSetZero,
     kHome,
     kHomeAll,
+    kSetOutput,
     kHold,
     kResume,
     kSpeedOverride,
@@ -30,10 +31,12 @@ struct Call {
   };
 
   What what = What::kStop;
-  std::string axis;       ///< empty: all
-  double distance = 0.0;  ///< [m|rad] of a step
-  double position = 0.0;  ///< [m|rad] to go to
-  double factor = 1.0;    ///< a speed override of 1.0 changes nothing
+  std::string axis;         ///< empty: all
+  double distance = 0.0;    ///< [m|rad] of a step
+  double position = 0.0;    ///< [m|rad] to go to
+  double factor = 1.0;      ///< a speed override of 1.0 changes nothing
+  std::string output = {};  ///< the output to switch
+  bool on = false;          ///< whether it is to be on
 
   /// The call in words: `x: home`. Only one call of a name is in progress at a time.
   std::string name() const;
@@ -118,6 +121,8 @@ class Session {
   const std::string& driverName() const { return name_; }
   /// The chosen axis, to which the keys apply; empty if there is none.
   const std::string& chosen() const { return chosen_; }
+  /// The output that `t` switches; nullptr if the driver has none.
+  const OutputView* chosenOutput() const;
   const StepSize& stepSize() const { return step_size_; }
   /// The position that is being typed; nullptr: none.
   const PositionPrompt* prompt() const { return prompt_ ? &*prompt_ : nullptr; }
@@ -140,6 +145,8 @@ class Session {
   void jogBy(const Command& command, double now, Orders& orders);
   void stepBy(int direction, double now, Orders& orders);
   void home(bool all, double now, Orders& orders);
+  void chooseNextOutput();
+  void switchOutput(double now, Orders& orders);
   void openPrompt(double now);
   void typeInto(Key key, double now, Orders& orders);
   /// Obeys a key that stops or quits, and closes what is being typed or asked.
@@ -171,6 +178,7 @@ class Session {
   std::optional<std::string> zero_asked_;
   std::optional<double> override_;
   std::string chosen_;
+  std::string chosen_output_;
   std::vector<PendingCall> pending_;
   Emergency emergency_ = Emergency::kNone;
   double emergency_since_ = 0.0;
