@@ -340,10 +340,10 @@ class Knots {
     append({time, interval, place, 0.0, parameter, speed, speed == 0.0});
   }
 
-  // Of knots that are too close to each other, only the first one stays, or one at rest. If the
-  // others make a difference, they are replaced by a state of the same motion at the shortest time
-  // from the one that stays. What is left out is then only how the axes move in that time; before
-  // and after it, the motion is as planned.
+  // If knots are too close to each other, only the first one stays, or one at rest. If the others
+  // make a difference, they are replaced by a state of the same motion at the shortest time from
+  // the one that stays. What is left out is then only how the axes move in that time; before and
+  // after it, the motion is as planned.
   void append(const Knot& next) {
     const double since = knots_.empty() ? kForever : next.time - knots_.back().time;
     if (since < closest_ && next.rests) {

@@ -15,7 +15,7 @@ constexpr double kForever = 3.0e9;  // [s] 95 years
 // [microsteps] 2^60: it fits into a Split, with room to spare.
 constexpr double kFarthestJog = 1.15292e18;
 
-constexpr double kRounding = 1e-15;  // of the doubles of a state, relative to them
+constexpr double kRounding = 1e-15;  // the rounding of the doubles of a state, relative to them
 
 }  // namespace
 

@@ -76,7 +76,7 @@ AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
   return axis;
 }
 
-/// Of an axis with several motors: one of them, as if it had no other.
+/// One motor of an axis with several, as if the axis had no other.
 AxisConfig motorAlone(const AxisConfig& axis, std::size_t motor) {
   AxisConfig alone = axis;
   alone.twins.clear();

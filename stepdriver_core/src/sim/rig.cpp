@@ -22,8 +22,8 @@ namespace {
 struct PinOnLine {
   enum class Of { kChip, kBrake, kMotorPower, kOutput };
   Of of;
-  RigAxis* axis;  ///< of a chip or a brake
-  Pin pin;        ///< of a chip
+  RigAxis* axis;  ///< the axis whose chip or brake it belongs to
+  Pin pin;        ///< the pin of a chip
   int trace_pin;
 };
 

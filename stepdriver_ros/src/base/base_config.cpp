@@ -23,7 +23,7 @@ constexpr Range kCommandTimeouts{0.02, 60.0};
 constexpr Range kDriverTimeouts{0.2, 60.0};
 constexpr Range kAngles{0.0, 90.0, true};
 constexpr double kDefaultAngle = 85.0;  // [deg]
-// With it a wheel in the middle could turn the base on the spot only by not turning.
+// With such a value, a wheel in the middle could turn the base on the spot only by not turning.
 constexpr double kMostAngleOfMiddle = 85.0;                  // [deg]
 constexpr double kMillimetres = 1000.0;                      // [mm/m]
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;  // [deg/rad]

@@ -21,7 +21,7 @@ enum class Side {
 struct WheelConfig {
   std::string axis;
   Side side = Side::kLeft;
-  std::optional<double> diameter;  ///< [m] of a wheel on a rotary axis
+  std::optional<double> diameter;  ///< [m] a wheel's, if its axis is rotary
 };
 
 struct SteeringConfig {

@@ -164,7 +164,7 @@ DriveOrders Drive::driveOrders(double seconds) {
   if (steers) twist_ = twistOf(*kinematics_.steering, speed_, angle_);
   const double fraction = changeFraction(kinematics_, wheelVelocities(kinematics_, twist_, angle_),
                                          wheelVelocities(kinematics_, goal, angle_), seconds);
-  // At the end exactly the goal, without the rounding of a sum.
+  // At the end it is exactly the goal, without the rounding of a sum.
   if (fraction < 1.0) {
     goal.linear = twist_.linear + fraction * (goal.linear - twist_.linear);
     goal.angular = twist_.angular + fraction * (goal.angular - twist_.angular);

@@ -38,8 +38,8 @@ struct Kinematics {
 
 /// What a tricycle does for a twist.
 struct SteeredMotion {
-  double angle = 0.0;  ///< [rad] of the steering
-  double speed = 0.0;  ///< [m/s] of the steered wheel along its heading
+  double angle = 0.0;  ///< [rad] the angle of the steering
+  double speed = 0.0;  ///< [m/s] the speed of the steered wheel along its heading
   bool exact = true;   ///< false: the steering can't turn that far, so the turn is wider
 };
 

@@ -42,7 +42,7 @@ void shutdownAfterLastMessages();
 template <typename ReadParameters, typename Make>
 int runClientNode(EndRequests& end_requests, const ReadParameters& read_parameters,
                   const Make& make) {
-  std::optional<ros::NodeHandle> node;  // with it roscpp and its console end
+  std::optional<ros::NodeHandle> node;  // roscpp and its console end with it
   try {
     // Before the handle registers this node, which ends a running node with the same name.
     const auto parameters = read_parameters();

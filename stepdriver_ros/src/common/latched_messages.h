@@ -86,7 +86,7 @@ class LatchedMessages {
     boost::weak_ptr<ros::M_string> connection;  // the last one
     std::uint64_t turn = 0;                     // when it was met last
   };
-  using Known = std::map<std::string, Publisher>;  // by the names of their nodes
+  using Known = std::map<std::string, Publisher>;  // The publishers by the names of their nodes
 
   void add(const std::string& topic, const Publishers& publishers);
   static void forgetOldest(Known& known);
@@ -94,7 +94,7 @@ class LatchedMessages {
   PublisherDirectory& directory_;
   Publishers at_begin_;
   std::mutex mutex_;
-  std::map<std::string, Known> known_;  // by topic
+  std::map<std::string, Known> known_;  // those of each topic
   std::uint64_t turn_ = 0;
 };
 

@@ -7,7 +7,7 @@ namespace stepdriver::ros_node {
 
 using XmlRpc::XmlRpcValue;
 
-// By value: XmlRpcValue's accessors are not const.
+// The values are copied, because XmlRpcValue's accessors are not const.
 config::ConfigValue configValue(XmlRpcValue value) {  // NOLINT(performance-unnecessary-value-param)
   switch (value.getType()) {
     case XmlRpcValue::TypeBoolean:

@@ -70,7 +70,7 @@ class DriverClient {
   ros::Subscriber log_;
 };
 
-/// [s] on the clock of sessions.
+/// [s] The time on the clock of sessions.
 double steadyNow();
 
 }  // namespace stepdriver::console

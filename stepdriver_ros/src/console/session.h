@@ -32,7 +32,7 @@ struct Call {
 
   What what = What::kStop;
   std::string axis;         ///< empty: all
-  double distance = 0.0;    ///< [m|rad] of a step
+  double distance = 0.0;    ///< [m|rad] the length of a step
   double position = 0.0;    ///< [m|rad] to go to
   double factor = 1.0;      ///< a speed override of 1.0 changes nothing
   std::string output = {};  ///< the output to switch

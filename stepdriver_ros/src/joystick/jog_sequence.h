@@ -6,7 +6,7 @@ namespace stepdriver::joystick {
 
 /// What to send for one axis now; empty members are not sent.
 struct JogOrders {
-  std::optional<double> velocity;  ///< [m/s|rad/s] of the jog
+  std::optional<double> velocity;  ///< [m/s|rad/s] the velocity of the jog
   std::optional<bool> enable;      ///< argument for the axis's service `enable`
 };
 

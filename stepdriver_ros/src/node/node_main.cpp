@@ -98,7 +98,7 @@ written, 3 the computer is too slow for its axes and ~realtime is enforce, 4 end
 Start it with: roslaunch stepdriver axis.launch
 )";
 
-/// With all parameters that the node reads.
+/// The text contains all parameters that the node reads.
 std::string usage() {
   constexpr std::size_t kWidth = 88;
   const std::string indent(14, ' ');
@@ -309,7 +309,7 @@ int explainConfig(const ConfigError& error) {
 /// Registers the node and runs it. @return the exit code.
 int runOrExplain(const Parameters& parameters, EndRequests& end_requests) {
   EndDespiteMaster end;
-  // With its last handle roscpp shuts down, and so does the log: these handles live until
+  // When the last handle is gone, roscpp shuts down, and so does the log: these handles live until
   // everything has been logged.
   const ros::NodeHandle node;
   const ros::NodeHandle private_node("~");

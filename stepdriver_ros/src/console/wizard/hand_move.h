@@ -14,9 +14,9 @@ struct SmallMove {
   double speed = 0.0;     ///< [mm/s|deg/s]
 };
 
-/// To see the direction.
+/// The move that shows the direction.
 SmallMove visibleMove(const config::AxisConfig& config);
-/// To measure it.
+/// The move that is measured.
 SmallMove measurableMove(const config::AxisConfig& config);
 
 /// "2 mm towards plus"

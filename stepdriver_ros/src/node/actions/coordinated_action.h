@@ -22,7 +22,7 @@ template <typename Action>
 struct FollowingTogether {
   actionlib::ServerGoalHandle<Action> handle;
   machine::CoordinatedMove move;
-  std::vector<double> began_at;  // [unit] of its axes
+  std::vector<double> began_at;  // [unit] the positions of its axes
   std::string preempted_by;      // a cancel, in words; empty: no cancel
   double progress = 0.0;         // as last reported
 };

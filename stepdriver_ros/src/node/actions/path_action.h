@@ -18,7 +18,7 @@ class PathAction : public CoordinatedAction<FollowPathAction> {
 
  private:
   machine::CoordinatedMove move(const FollowPathGoal& goal) override;
-  /// By the planned time: a path may pass the same place several times.
+  /// The progress follows the planned time, because a path may pass the same place several times.
   double progressOfGoal(const Following& following, const States& states) const override;
   void complete(const Following& following, FollowPathFeedback& feedback) const override;
 };

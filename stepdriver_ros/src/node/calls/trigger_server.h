@@ -82,8 +82,8 @@ class TriggerServer {
   void serveConnections(Clock::time_point now);
   void accept();
   bool makeRoom();
-  /// Of the idle clients and of the others, the larger group loses the one that has been silent for
-  /// the longest time.
+  /// If one has to be closed, the larger of the two groups, idle clients and others, loses the one
+  /// that has been silent for the longest time.
   void disconnectOne();
 
   const std::string name_;

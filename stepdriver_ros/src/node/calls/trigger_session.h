@@ -14,7 +14,7 @@ namespace stepdriver::ros_node {
 /// Must not throw.
 using TriggerHandler =
     std::function<bool(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response)>;
-/// By the full names of the services.
+/// The services by their full names.
 using TriggerServices = std::map<std::string, TriggerHandler>;
 
 /// The conversation with one client of Trigger services by TCPROS: a header from each side, then
