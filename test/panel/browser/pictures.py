@@ -18,7 +18,7 @@ PHONE, DESKTOP = (360, 780), (1100, 860)
 
 def machine_screen(page):
     page.click(page.axis("x", '[data-do="home"]'))
-    wait_until(lambda: page.machine.state("x")["homed"], "x is homed")
+    page.wait_said("x is homed")  # otherwise this would replace the refusal below
     page.find(page.axis("y", ".goto input")).send_keys("999\n")
     page.wait_said("above the soft limit")
 
