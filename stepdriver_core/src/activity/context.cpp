@@ -10,9 +10,18 @@ std::shared_ptr<std::vector<pulse::Follow>> Context::newCommand(std::uint64_t st
       [start](const FollowCommand& other) { return start != 0 && other.start == start; });
   if (shared != follow_commands_.end()) return shared->follows;
   auto follows = std::make_shared<std::vector<pulse::Follow>>();
-  follow_commands_.push_back({out->commands.size(), start, follows});
+  follow_commands_.push_back({out->commands.size(), start, follows, nullptr});
   out->commands.emplace_back();
   return follows;
+}
+
+std::shared_ptr<std::vector<pulse::FollowMarks>> Context::marksOf(
+    const std::shared_ptr<std::vector<pulse::Follow>>& command) {
+  const auto found =
+      std::find_if(follow_commands_.begin(), follow_commands_.end(),
+                   [&](const FollowCommand& other) { return other.follows == command; });
+  if (!found->marks) found->marks = std::make_shared<std::vector<pulse::FollowMarks>>();
+  return found->marks;
 }
 
 void Context::endTurn() {
@@ -20,6 +29,9 @@ void Context::endTurn() {
     pulse::Command& posted = out->commands[command.index];
     posted.follows = command.follows->data();
     posted.follow_count = command.follows->size();
+    if (!command.marks) continue;
+    posted.marks = command.marks->data();
+    posted.marks_count = command.marks->size();
   }
   follow_commands_.clear();
 }

@@ -12,6 +12,7 @@
 #include "axis/axis_model.h"
 #include "call.h"
 #include "motor_power.h"
+#include "path_outputs.h"
 #include "pulse/command.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -56,6 +57,7 @@ class Context : public AnswerSink {
   axis::LineNames lines;
   std::vector<std::unique_ptr<axis::AxisModel>> axes;
   MotorPower motor_power;
+  PathOutputs path_outputs;
 
   /// @name What belongs to this turn
   /// @{
@@ -87,6 +89,10 @@ class Context : public AnswerSink {
   /// none.
   /// @param start those of one turn with the same number share a command, unless it is 0.
   std::shared_ptr<std::vector<pulse::Follow>> newCommand(std::uint64_t start);
+  /// The marks of such a command.
+  /// @return they must live until the engine has handled it.
+  std::shared_ptr<std::vector<pulse::FollowMarks>> marksOf(
+      const std::shared_ptr<std::vector<pulse::Follow>>& command);
 
   void answer(CallId call, Reply reply) override {
     if (call != 0) out->answers.emplace_back(call, std::move(reply));
@@ -97,6 +103,7 @@ class Context : public AnswerSink {
     std::size_t index = 0;  // its index in Outputs::commands
     std::uint64_t start = 0;
     std::shared_ptr<std::vector<pulse::Follow>> follows;
+    std::shared_ptr<std::vector<pulse::FollowMarks>> marks;
   };
 
   std::vector<FollowCommand> follow_commands_;  // those of this turn

@@ -10,6 +10,7 @@
 
 #include "axis/axis_model.h"
 #include "call.h"
+#include "path_outputs.h"
 #include "point_to_point/motion_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -52,6 +53,7 @@ struct Goal {
   MotorsTogether motors;
   /// Its steps are never late by more than a quarter of an interval: its end measures a place.
   bool measures = false;
+  std::shared_ptr<const MarksOfPath> marks;  ///< of its path; may be empty
   motion::MotionLimits path_limits;  ///< [microsteps] the limits that the path of a kTogether keeps
   /// At the target the axis waits for a path that continues its own: it isn't the end.
   bool waits_at_target = false;

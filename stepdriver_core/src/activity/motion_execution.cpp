@@ -79,17 +79,23 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
   return {axis::MoveEnd::kCompanion, "an axis that it moved together with was stopped"};
 }
 
+void addMarks(const Goal& goal, axis::MoveResult& result) {
+  if (!goal.marks) return;
+  result.marks_made = goal.marks->made();
+  result.marks_not_made = goal.marks->notMade();
+  result.message += goal.marks->text();
+}
+
 axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis, const Goal& goal,
                             axis::MoveEnd end, const std::string& why) {
   axis::MoveResult result;
   result.end = end;
   result.position = axis.positionNow();
   result.duration = durationOf(context, goal, axis.motor.state().end_time);
-  if (end == axis::MoveEnd::kReached) {
-    result.message = fmt::format("{} reached {}", axis.name(), axis.showPlace(result.position));
-    return result;
-  }
-  result.message = standsAt(axis, goal, why) + axis.abruptText();
+  result.message = end == axis::MoveEnd::kReached
+                       ? fmt::format("{} reached {}", axis.name(), axis.showPlace(result.position))
+                       : standsAt(axis, goal, why) + axis.abruptText();
+  addMarks(goal, result);
   return result;
 }
 
@@ -203,6 +209,7 @@ MotionExecution::Plans MotionExecution::plan(pulse::Nanoseconds lead) {
   try {
     if (!alone) {
       plans.path = planPath(plans.at);
+      if (mustWaitForOutputs(plans)) plans.path = planPath(plans.at);
       for (std::size_t i = 0; i < orders_.size(); ++i) {
         const motor::Motor& motor = orders_[i].axis->motor;
         plans.planned.push_back({motor.shaped(course_.path->profileOf(i, *plans.path)), 0.0,
@@ -232,6 +239,9 @@ MotionExecution::Plans MotionExecution::plan(pulse::Nanoseconds lead) {
 
 std::vector<axis::Move> MotionExecution::prepare() {
   prepared_ = plan(lead_);
+  if (course_.path && course_.path->marks()) {
+    context_.path_outputs.refuseUnlessFree(*course_.path->marks(), group_, axesAlong());
+  }
   std::vector<axis::Move> moves;
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Planned& planned = prepared_->planned[i];
@@ -243,6 +253,48 @@ std::vector<axis::Move> MotionExecution::prepare() {
     moves.push_back(std::move(move));
   }
   return moves;
+}
+
+// ---- outputs along its path ----
+
+std::vector<const axis::AxisModel*> MotionExecution::axesAlong() const {
+  std::vector<const axis::AxisModel*> axes;
+  axes.reserve(orders_.size());
+  for (const Order& order : orders_) axes.push_back(order.axis);
+  return axes;
+}
+
+// @throw Refused if one of them isn't free.
+void MotionExecution::takeOutputs(const motion::SharedPath& path) {
+  const auto wanted = path.marks();
+  if (!wanted) return;
+  if (!marks_) {
+    marks_ = std::make_shared<MarksOfPath>();
+    marks_->group = group_;
+  }
+  context_.path_outputs.take(*wanted, marks_, axesAlong());
+  for (Order& order : orders_) order.goal.marks = marks_;
+}
+
+// The first marks can't come before the least times of their outputs are over: then it begins
+// later.
+bool MotionExecution::mustWaitForOutputs(Plans& plans) const {
+  if (started_ || slowsDown() || !course_.path->marks()) return false;
+  const std::int64_t earliest =
+      context_.path_outputs.mayBegin(*course_.path->marks()) - context_.slipped;
+  if (earliest <= plans.at) return false;
+  plans.at = earliest;
+  return true;
+}
+
+void MotionExecution::orderMarks(const Plans& plans,
+                                 const std::shared_ptr<std::vector<pulse::Follow>>& follows) {
+  if (!marks_ || plans.path == nullptr) return;
+  const auto along = course_.path->marks();
+  if (!along) return;
+  std::int64_t delay = 0;
+  for (const Order& order : orders_) delay = std::max(delay, order.axis->motor.shapingDelay());
+  context_.path_outputs.order(group_, plans.path, along, delay, context_.marksOf(follows));
 }
 
 // ---- orders to the engine ----
@@ -294,6 +346,7 @@ void MotionExecution::order(Plans plans, const SharedCall& extension) {
     motion.slows_down = mode_ == Mode::kStop;
     order.axis->motor.ordered(std::move(motion));
   }
+  orderMarks(plans, open.follows);
   path_ = plans.path;
   open.plans = std::move(plans);
   open_.push_back(std::move(open));
@@ -302,6 +355,7 @@ void MotionExecution::order(Plans plans, const SharedCall& extension) {
 void MotionExecution::begin(std::vector<Predecessor> predecessors, SharedCall call) {
   predecessors_ = std::move(predecessors);
   call_ = std::move(call);
+  if (course_.path) takeOutputs(*course_.path);
   order(*std::exchange(prepared_, std::nullopt));
 }
 
@@ -337,6 +391,7 @@ void MotionExecution::stop(const EarlyEnd& why, const SharedCall& call) {
     return;
   }
   why_ = why;
+  if (marks_) context_.path_outputs.stop(context_, group_);
   if (anyMoves()) return change(Mode::kStop, call);
   if (isParked()) drop();  // otherwise it has come to rest by itself
 }
@@ -422,6 +477,11 @@ bool MotionExecution::mayExtend(const Extension& extension) const {
 void MotionExecution::tryExtension() {
   const auto [extension, call] = *std::exchange(extension_, std::nullopt);
   if (!mayExtend(extension)) return call->fail(outdated(*orders_.front().axis));
+  try {
+    takeOutputs(*extension.path);
+  } catch (const Error& error) {
+    return call->fail(failureOf(error));
+  }
   if (extension.moves_on && mode_ == Mode::kRun) return orderExtension(extension, call);
   follow({extension.path, extension.targets});
   accepted_course_ = course_;
@@ -496,7 +556,8 @@ bool MotionExecution::poll() {
     }
   }
   if (!over_ && open_.empty() && extension_) tryExtension();
-  if (!over_ && open_.empty() && !anyMoves() && !isParked()) rested();
+  const bool rests = !over_ && open_.empty() && !anyMoves() && !isParked();
+  if (rests && !(marks_ && context_.path_outputs.isDue(group_))) rested();
   return over_;
 }
 
@@ -656,6 +717,10 @@ void MotionExecution::concludePredecessors() {
 
 void MotionExecution::finish() {
   concludePredecessors();
+  if (marks_) {
+    const bool reached = why_.text.empty() && result_.end == axis::MoveEnd::kReached;
+    context_.path_outputs.leave(context_, group_, reached);
+  }
   over_ = true;
   held_ = false;
   awaits_ = false;
@@ -666,6 +731,7 @@ void MotionExecution::finish() {
 }
 
 std::vector<Predecessor> MotionExecution::handOver() {
+  if (marks_) context_.path_outputs.leave(context_, group_, false);
   std::vector<Predecessor> left = std::exchange(predecessors_, {});
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Order& order = orders_[i];
@@ -768,6 +834,7 @@ axis::MoveResult MotionExecution::replacedResult(const Predecessor& before, cons
   }
   result.message = fmt::format("{} was at {} when {} took over", axis.name(),
                                axis.showPlace(result.position), what);
+  addMarks(before.goal, result);
   return result;
 }
 

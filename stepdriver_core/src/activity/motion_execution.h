@@ -117,6 +117,10 @@ class MotionExecution {
   Plans plan(pulse::Nanoseconds lead);
   std::shared_ptr<const motion::Profile> planPath(std::int64_t at);
   void order(Plans plans, const SharedCall& extension = {});
+  void orderMarks(const Plans& plans, const std::shared_ptr<std::vector<pulse::Follow>>& follows);
+  std::vector<const axis::AxisModel*> axesAlong() const;
+  void takeOutputs(const motion::SharedPath& path);
+  bool mustWaitForOutputs(Plans& plans) const;
   void follow(Course course);
   void tryExtension();
   bool mayExtend(const Extension& extension) const;
@@ -156,6 +160,7 @@ class MotionExecution {
   std::optional<std::pair<Extension, SharedCall>>
       extension_;  // waits until the engine has handled all
   std::uint64_t group_ = 0;
+  std::shared_ptr<MarksOfPath> marks_;  // empty: its path has none
   std::vector<Predecessor> predecessors_;
   std::optional<Plans> prepared_;
 

@@ -44,6 +44,7 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
   context_.out = &last_;
   context_.lines = std::move(names);
   context_.motor_power = std::move(motor_power);
+  context_.path_outputs = activity::PathOutputs(requests_.named.outputs.configs());
   context_.mode.powered = context_.motor_power.isThere();
   for (std::size_t i = 0; i < axes.size(); ++i) {
     context_.axes.push_back(std::make_unique<axis::AxisModel>(
@@ -101,6 +102,7 @@ void Controller::on(const EngineNews& news) {
   handleStops(news);
   for (std::size_t i = 0; i < news.channels.size(); ++i)
     update(*context_.axes.at(i), news.channels[i]);
+  context_.path_outputs.update(news.outputs);
 }
 
 void Controller::handleStops(const EngineNews& news) {

@@ -105,15 +105,29 @@ std::string outcomeText(const activity::Reply& reply) {
   return (refused ? "refused: " : "failed: ") + reply.failure->text;
 }
 
-/// Adds the edges from `begin` on, and gives each output the level that it had before them.
-void addEdges(const pulse::PinRing::Copy& ring, pulse::Nanoseconds begin, Recording& recording,
-              std::vector<bool>& settled) {
-  for (const pulse::PinRing::Edge& edge : ring.edges) {
-    const auto output = static_cast<std::size_t>(edge.output);
-    if (edge.time < begin) continue;
-    if (!settled[output]) recording.levels[output] = !edge.level;
-    settled[output] = true;
-    recording.edges.push_back({edge.time, edge.output, edge.level});
+/// The edges of both rings from a time on, in their order.
+std::vector<Recording::Edge> edgesOf(const pulse::PinRing::Copy& steps,
+                                     const pulse::PinRing::Copy& others, pulse::Nanoseconds begin) {
+  std::vector<Recording::Edge> edges;
+  for (const pulse::PinRing::Copy* ring : {&steps, &others}) {
+    for (const pulse::PinRing::Edge& edge : ring->edges) {
+      if (edge.time >= begin) edges.push_back({edge.time, edge.output, edge.level});
+    }
+  }
+  std::stable_sort(edges.begin(), edges.end(),
+                   [](const auto& a, const auto& b) { return a.time < b.time; });
+  return edges;
+}
+
+/// Gives each output with an edge the level that it had before the first one, and leaves out what
+/// is no edge: an output that both rings have may be written again as it is.
+void addEdges(const std::vector<Recording::Edge>& edges, Recording& recording) {
+  std::vector<int> level(recording.levels.size(), -1);
+  for (const Recording::Edge& edge : edges) {
+    int& known = level[static_cast<std::size_t>(edge.output)];
+    if (known < 0) recording.levels[static_cast<std::size_t>(edge.output)] = !edge.level;
+    if (known != static_cast<int>(edge.level)) recording.edges.push_back(edge);
+    known = static_cast<int>(edge.level);
   }
 }
 
@@ -156,7 +170,9 @@ FlightRecorder::FlightRecorder(const std::vector<config::AxisConfig>& axes, cons
       pins_(pinsOf(axes, wiring, options.outputs)),
       pulse_ring_(levelsOf(wiring), edgesToKeep(axes, wiring, options)),
       other_ring_(levelsOf(wiring), kOtherEdges),
+      switched_(wiring.outputs.size()),
       events_(kEvents) {
+  for (const int output : wiring.named_outputs) switched_[static_cast<std::size_t>(output)] = true;
   const double rate = edgesPerSecond(axes, wiring);
   const auto most = static_cast<double>(edgesToKeep(axes, wiring, options));
   seconds_at_top_speed_ = std::min(options.seconds, most / std::max(rate, 1e-9));
@@ -303,8 +319,8 @@ Recording FlightRecorder::recording(pulse::Clock& clock) const {
     recording.begin = ring->edges.front().time + 1;
     recording.shortened = true;
   }
-  // Each output is written by the writers of one ring: the levels of the other are those of the
-  // beginning.
+  // Each output but those with a name is written by the writers of one ring: the levels of the
+  // other are those of the beginning.
   recording.levels = others.levels;
   for (const Recording::Pin& pin : pins_) {
     const auto output = static_cast<std::size_t>(pin.output);
@@ -312,11 +328,7 @@ Recording FlightRecorder::recording(pulse::Clock& clock) const {
         pin.name == "step" || pin.name == "dir" || pin.name == "cw" || pin.name == "ccw";
     if (by_pulses) recording.levels[output] = steps.levels[output];
   }
-  std::vector<bool> settled(recording.levels.size());
-  addEdges(steps, recording.begin, recording, settled);
-  addEdges(others, recording.begin, recording, settled);
-  std::stable_sort(recording.edges.begin(), recording.edges.end(),
-                   [](const auto& a, const auto& b) { return a.time < b.time; });
+  addEdges(edgesOf(steps, others, recording.begin), recording);
   return recording;
 }
 

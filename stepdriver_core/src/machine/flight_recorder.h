@@ -45,6 +45,9 @@ class FlightRecorder {
   pulse::PinRing& pulseRing() { return pulse_ring_; }
   /// A line writer has written an output. From one thread at a time.
   void addWrite(const gpio::LineWrite& write, pulse::Nanoseconds now) {
+    if (switched_[static_cast<std::size_t>(write.output)]) {
+      return other_ring_.addChange(write.output, write.level, now);
+    }
     other_ring_.add(write.output, write.level, now);
   }
 
@@ -83,6 +86,7 @@ class FlightRecorder {
   double seconds_at_top_speed_ = 0.0;
   pulse::PinRing pulse_ring_;
   pulse::PinRing other_ring_;
+  std::vector<bool> switched_;  // by output: it has a name, and paths write it too
   EventRing events_;
 
   // Only the controller's thread uses these.

@@ -7,6 +7,7 @@
 #include "activity/call.h"
 #include "activity/context.h"
 #include "channel/channel_state.h"
+#include "channel/output_line.h"
 #include "requests/request.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -25,6 +26,7 @@ struct EngineNews {
   std::uint64_t stops_ramping = 0;  ///< PulseEngine::stopsRamping()
   std::uint64_t input_stops = 0;
   std::vector<pulse::ChannelState> channels;
+  std::vector<pulse::OutputLineState> outputs;  ///< read after the channels
 };
 struct InputRead {
   int input = -1;

@@ -51,7 +51,7 @@ class Machine::Impl {
  public:
   Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options)
-      : clock_(clock), disposer_(options.threaded) {
+      : clock_(clock), disposer_(options.threaded), outputs_(options.outputs) {
     checkConfiguration(configs, options);
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
@@ -71,6 +71,7 @@ class Machine::Impl {
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
                                                    nanoseconds(options.max_lateness),
                                                    wiring.emergency_stop, wiring.shared);
+    engine_->switchOutputs(wiring.switchedOutputs(options));
     controller_ = std::make_unique<Controller>(
         configs, wiring.motor_lines, names_, wiring.emergency_stop, options.emergency_disable,
         wiring.motorPower(options), wiring.namedLines(options), engine_->horizon());
@@ -217,7 +218,7 @@ class Machine::Impl {
     return follow(request.names, [&](const MachineSnapshot& now, FollowTrajectory& wanted) {
       const std::vector<motion::PathAxis> facts = factsOf(now, wanted.axes);
       const std::vector<motion::PathOrigin> origins = originsOf(now, wanted.axes);
-      motion::PathPlan plan = motion::planPath(request, facts, origins);
+      motion::PathPlan plan = motion::planPath(request, facts, origins, outputs_);
       wanted.path.emplace();
       std::vector<motion::MotionState> expected;
       for (const motion::PathOrigin& origin : origins) {
@@ -226,8 +227,8 @@ class Machine::Impl {
       }
       wanted.path->targets = std::move(plan.targets);
       if (plan.window) wanted.path->window = disposer_.keep(std::move(plan.window));
-      wanted.prepared = disposer_.keep(
-          std::make_shared<const motion::PreparedTrajectory>(facts, plan.points, expected));
+      wanted.prepared = disposer_.keep(std::make_shared<const motion::PreparedTrajectory>(
+          facts, plan.points, expected, false, std::move(plan.marks)));
     });
   }
 
@@ -238,7 +239,7 @@ class Machine::Impl {
     const std::vector<motion::PathAxis> facts = factsOf(*now, axes);
     const std::vector<motion::PathOrigin> origins =
         from.empty() ? originsOf(*now, axes) : originsAt(from, facts);
-    const motion::PathPlan plan = motion::planPath(request, facts, origins);
+    const motion::PathPlan plan = motion::planPath(request, facts, origins, outputs_);
     std::vector<motion::MotionState> begin;
     begin.reserve(origins.size());
     for (const motion::PathOrigin& origin : origins) {
@@ -532,6 +533,7 @@ class Machine::Impl {
   pulse::Clock& clock_;
   // Destroyed in this order: axes, shell, controller, engine, recorder, lines.
   Disposer disposer_;
+  const std::vector<config::OutputConfig> outputs_;
   std::mutex io_mutex_;  // guards on_io_
   std::function<void(const IoStates&)> on_io_;
   std::shared_ptr<gpio::Lines> lines_;
@@ -553,6 +555,8 @@ CoordinatedResult combinedResult(const std::vector<axis::MoveResult>& members) {
   for (const axis::MoveResult& own : members) {
     result.positions.push_back(own.position);
     result.duration = std::max(result.duration, own.duration);
+    result.marks_made = std::max(result.marks_made, own.marks_made);
+    result.marks_not_made = std::max(result.marks_not_made, own.marks_not_made);
     // An axis's own reason says more than that it was ended together with another one.
     const int weight = own.end == axis::MoveEnd::kReached     ? 0
                        : own.end == axis::MoveEnd::kCompanion ? 1

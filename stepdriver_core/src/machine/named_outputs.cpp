@@ -17,8 +17,8 @@ using activity::SharedCall;
 
 // ---- one ----
 
-NamedOutput::NamedOutput(const config::OutputConfig& config, int line)
-    : config_(config), line_(line), wanted_(config.at_fault) {
+NamedOutput::NamedOutput(const config::OutputConfig& config, std::size_t number, int line)
+    : config_(config), number_(number), line_(line), wanted_(config.at_fault) {
   state_.name = config.name;
   state_.on = config.at_fault;
 }
@@ -51,15 +51,23 @@ void NamedOutput::await(const SharedCall& call) {
 
 std::string NamedOutput::poll(activity::Context& context, const std::string& why_safe) {
   const bool must_be_safe = !why_safe.empty();
-  std::string failure = endWrite(context);
+  std::string failure = adopt(context);
+  if (const std::string own = endWrite(context); failure.empty()) failure = own;
+  activity::PathOutputs& paths = context.path_outputs;
+  is_taken_ = paths.isTaken(number_);
   if (must_be_safe) {
+    paths.end(context, number_);
+    paths.takeWanted(number_);
     refuseCalls(why_safe);
     wanted_ = config_.at_fault;
+  } else if (is_taken_) {
+    paths.note(number_, lineForPaths(why_safe));
+    return failure;
+  } else if (const std::optional<bool> left = paths.takeWanted(number_)) {
+    set(*left, {});
   } else if (mustGoOff(context.now)) {
     wanted_ = false;
-    state_.note =
-        fmt::format("was switched off: it had been on for {} s, the most that max_on_s allows",
-                    numberText(static_cast<double>(*config_.max_on_ns) / 1e9));
+    state_.note = tooLongText();
   }
   may_wait_ = !must_be_safe;
   if (job_ || (!certain_ && gave_up_)) return failure;
@@ -69,13 +77,52 @@ std::string NamedOutput::poll(activity::Context& context, const std::string& why
   } else if (must_be_safe || context.now >= mayChange()) {
     write(context, must_be_safe);
   }
+  paths.note(number_, lineForPaths(why_safe));
   return failure;
 }
 
+// What a path has made of the line since the last look.
+std::string NamedOutput::adopt(activity::Context& context) {
+  const pulse::OutputLineState& by_path = context.path_outputs.state(number_);
+  if (by_path.changes != std::exchange(changes_seen_, by_path.changes)) {
+    // If it was written here at that time, nobody knows which write came last.
+    if (job_) job_->doubtful = true;
+    if (by_path.changed <= wrote_until_ && by_path.changed >= wrote_from_) certain_ = false;
+    if (by_path.changed >= wrote_from_) {
+      state_.on = wanted_ = by_path.on;
+      state_.changed = by_path.changed;
+      on_since_ = by_path.on_since;
+      state_.note = by_path.too_long ? tooLongText() : "";
+    }
+  }
+  if (by_path.error == std::exchange(error_seen_, by_path.error) || by_path.error == 0) return {};
+  return failed(by_path.error, context);
+}
+
+activity::PathOutputs::Line NamedOutput::lineForPaths(const std::string& why_safe) const {
+  activity::PathOutputs::Line line;
+  if (!why_safe.empty()) {
+    line.why_not = why_safe;
+  } else if (!state_.error.empty()) {
+    line.why_not = state_.error;
+  } else if (job_ || state_.on != wanted_) {
+    line.why_not = "it is being switched";
+  }
+  line.on = state_.on;
+  line.changed = state_.changed.value_or(0);
+  line.on_since = on_since_;
+  return line;
+}
+
 pulse::Nanoseconds NamedOutput::due() const {
-  if (job_ || !may_wait_ || (!certain_ && gave_up_)) return pulse::kNever;
+  if (job_ || is_taken_ || !may_wait_ || (!certain_ && gave_up_)) return pulse::kNever;
   if (!certain_ || state_.on != wanted_) return mayChange();
   return state_.on && config_.max_on_ns ? on_since_ + *config_.max_on_ns : pulse::kNever;
+}
+
+std::string NamedOutput::tooLongText() const {
+  return fmt::format("was switched off: it had been on for {} s, the most that max_on_s allows",
+                     numberText(static_cast<double>(*config_.max_on_ns) / 1e9));
 }
 
 bool NamedOutput::mustGoOff(pulse::Nanoseconds now) const {
@@ -98,18 +145,14 @@ std::string NamedOutput::endWrite(activity::Context& context) {
   const Job job = *std::exchange(job_, std::nullopt);
   const std::vector<SharedCall> calls = std::exchange(write_calls_, {});
   if (const int error = context.pin_done->error; error != 0) {
-    certain_ = false;
+    const std::string text = failed(error, context);
     gave_up_ = job.safe;
-    state_.error = fmt::format(
-        "the line {} of the output {} can't be written: {}; check the cable and the supply of its "
-        "chip",
-        context.lines.output(line_), config_.name, gpio::errorText(error));
-    for (const std::vector<SharedCall>& waiting : {calls, std::exchange(calls_, {})}) {
-      for (const SharedCall& call : waiting) call->fail({Failure::Kind::kGpio, state_.error});
-    }
-    return state_.error;
+    for (const SharedCall& call : calls) call->fail({Failure::Kind::kGpio, text});
+    return text;
   }
-  certain_ = true;
+  wrote_from_ = job.began;
+  wrote_until_ = context.now;
+  certain_ = !job.doubtful;
   gave_up_ = false;
   state_.error.clear();
   if (job.on == state_.on) return {};
@@ -117,6 +160,19 @@ std::string NamedOutput::endWrite(activity::Context& context) {
   on_since_ = job.began;
   state_.changed = context.now;
   return {};
+}
+
+std::string NamedOutput::failed(int error, activity::Context& context) {
+  certain_ = false;
+  gave_up_ = false;
+  state_.error = fmt::format(
+      "the line {} of the output {} can't be written: {}; check the cable and the supply of its "
+      "chip",
+      context.lines.output(line_), config_.name, gpio::errorText(error));
+  for (const SharedCall& call : std::exchange(calls_, {})) {
+    call->fail({Failure::Kind::kGpio, state_.error});
+  }
+  return state_.error;
 }
 
 void NamedOutput::refuseCalls(const std::string& why) {
@@ -129,17 +185,23 @@ void NamedOutput::refuseCalls(const std::string& why) {
 
 NamedOutputs::NamedOutputs(const std::vector<config::OutputConfig>& outputs,
                            const std::vector<int>& lines) {
-  for (std::size_t i = 0; i < outputs.size(); ++i) outputs_.emplace_back(outputs[i], lines[i]);
+  for (std::size_t i = 0; i < outputs.size(); ++i) outputs_.emplace_back(outputs[i], i, lines[i]);
 }
 
 void NamedOutputs::begin(const SharedCall& call) {
   for (NamedOutput& output : outputs_) output.begin(call);
 }
 
-void NamedOutputs::set(const std::string& name, bool on, const SharedCall& call) {
+void NamedOutputs::set(const activity::Context& context, const std::string& name, bool on,
+                       const SharedCall& call) {
   const auto found = std::find_if(outputs_.begin(), outputs_.end(),
                                   [&](const NamedOutput& output) { return output.name() == name; });
-  if (found != outputs_.end()) return found->set(on, call);
+  if (found != outputs_.end()) {
+    const auto number = static_cast<std::size_t>(found - outputs_.begin());
+    if (!context.path_outputs.isTaken(number)) return found->set(on, call);
+    throw Refused(
+        fmt::format("the output {}: {} switches it", name, context.path_outputs.holder(number)));
+  }
   if (outputs_.empty()) {
     throw Refused(fmt::format("there is no output {}: none is configured", printable(name)));
   }
@@ -148,9 +210,10 @@ void NamedOutputs::set(const std::string& name, bool on, const SharedCall& call)
                   joinedText(outputs_, [](const NamedOutput& output) { return output.name(); })));
 }
 
-void NamedOutputs::stop() {
-  for (NamedOutput& output : outputs_) {
-    if (output.config().at_stop) output.set(*output.config().at_stop, {});
+void NamedOutputs::stop(const activity::Context& context) {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    const std::optional<bool>& at_stop = outputs_[i].config().at_stop;
+    if (at_stop && !context.path_outputs.isTaken(i)) outputs_[i].set(*at_stop, {});
   }
 }
 
@@ -180,6 +243,12 @@ pulse::Nanoseconds NamedOutputs::due() const {
 bool NamedOutputs::areBeingWritten() const {
   return std::any_of(outputs_.begin(), outputs_.end(),
                      [](const NamedOutput& output) { return output.isBeingWritten(); });
+}
+
+std::vector<config::OutputConfig> NamedOutputs::configs() const {
+  std::vector<config::OutputConfig> configs;
+  for (const NamedOutput& output : outputs_) configs.push_back(output.config());
+  return configs;
 }
 
 std::vector<OutputState> NamedOutputs::states() const {

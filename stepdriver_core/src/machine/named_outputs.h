@@ -16,8 +16,8 @@ namespace stepdriver::machine {
 /// line is requested in its safe state.
 class NamedOutput {
  public:
-  /// @param line its index in the request.
-  NamedOutput(const config::OutputConfig& config, int line);
+  /// @param number of it in the configuration. @param line its index in the request.
+  NamedOutput(const config::OutputConfig& config, std::size_t number, int line);
 
   const std::string& name() const { return config_.name; }
   const OutputState& state() const { return state_; }
@@ -50,23 +50,34 @@ class NamedOutput {
     bool on = false;
     bool safe = false;
     pulse::Nanoseconds began = 0;
+    bool doubtful = false;  // a path has switched it meanwhile: nobody knows which was the last
   };
 
+  std::string tooLongText() const;
   std::string endWrite(activity::Context& context);
+  std::string adopt(activity::Context& context);
+  std::string failed(int error, activity::Context& context);
+  activity::PathOutputs::Line lineForPaths(const std::string& why_safe) const;
   void write(activity::Context& context, bool safe);
   void refuseCalls(const std::string& why);
   bool mustGoOff(pulse::Nanoseconds now) const;
   pulse::Nanoseconds mayChange() const;
 
   config::OutputConfig config_;
+  std::size_t number_;
   int line_;
   bool wanted_;
   OutputState state_;
-  bool certain_ = true;              // whether the line has the level of that state for certain
-  bool gave_up_ = false;             // whether it gave up writing the safe state, until retry()
-  pulse::Nanoseconds on_since_ = 0;  // when the write that switched it on began
-  bool may_wait_ = false;            // whether it may wait for its least times
-  std::optional<Job> job_;           // being written
+  bool certain_ = true;                  // whether the line has the level of that state for certain
+  bool gave_up_ = false;                 // whether it gave up writing the safe state, until retry()
+  pulse::Nanoseconds on_since_ = 0;      // when the write that switched it on began
+  bool may_wait_ = false;                // whether it may wait for its least times
+  bool is_taken_ = false;                // whether a path switches it
+  std::uint64_t changes_seen_ = 0;       // by paths
+  int error_seen_ = 0;                   // of a path
+  std::optional<Job> job_;               // being written
+  pulse::Nanoseconds wrote_from_ = 0;    // when the last write began
+  pulse::Nanoseconds wrote_until_ = -1;  // when its end was known
   std::vector<activity::SharedCall> calls_;  // wait until it is as wanted
   std::vector<activity::SharedCall>
       write_calls_;  // wait for the end of the next write, if there is one
@@ -81,10 +92,11 @@ class NamedOutputs {
 
   /// Switches each as it begins. @param call is answered when that is done.
   void begin(const activity::SharedCall& call);
-  /// @throw Refused if there is no such output; it names those that there are.
-  void set(const std::string& name, bool on, const activity::SharedCall& call);
-  /// The machine is stopped.
-  void stop();
+  /// @throw Refused if there is no such output, naming those that there are, or if a path has it.
+  void set(const activity::Context& context, const std::string& name, bool on,
+           const activity::SharedCall& call);
+  /// The machine is stopped. Outputs that paths have are stopped with these.
+  void stop(const activity::Context& context);
   /// See NamedOutput.
   void retry(const activity::SharedCall& call);
   void await(const activity::SharedCall& call);
@@ -92,6 +104,7 @@ class NamedOutputs {
   pulse::Nanoseconds due() const;
   bool areBeingWritten() const;
   std::vector<OutputState> states() const;
+  std::vector<config::OutputConfig> configs() const;
   bool empty() const { return outputs_.empty(); }
 
  private:

@@ -21,6 +21,7 @@ ShellCore::ShellCore(Controller& controller, pulse::PulseEngine& engine, pulse::
       recorder_(recorder),
       told_levels_(inputs),
       posted_(engine.channels()),
+      posted_marks_(engine.outputs()),
       snapshot_(controller.snapshot()),
       due_(controller.due()),
       watches_(controller.watchesInputs()) {
@@ -85,6 +86,7 @@ bool ShellCore::takeNews() {
   for (std::size_t i = 0; i < posted_.size(); ++i) {
     news.channels.push_back(engine_.channel(static_cast<int>(i)));
   }
+  for (std::size_t i = 0; i < posted_marks_.size(); ++i) news.outputs.push_back(engine_.output(i));
   news_seen_ = news;
   handle(std::move(news));
   postCommands();
@@ -160,7 +162,12 @@ void ShellCore::postCommands() {
     for (std::size_t i = 0; i < command.follow_count; ++i) {
       posted_[static_cast<std::size_t>(command.follows[i].channel)] = command.follows[i].serial;
     }
-    if (command.kind != pulse::Command::Kind::kFollow) {
+    for (std::size_t i = 0; i < command.marks_count; ++i) {
+      posted_marks_[command.marks[i].output] = command.marks[i].serial;
+    }
+    if (command.kind == pulse::Command::Kind::kEndMarks) {
+      posted_marks_[command.output] = command.serial;
+    } else if (command.kind != pulse::Command::Kind::kFollow) {
       posted_[static_cast<std::size_t>(command.channel)] = command.serial;
     }
     outbox_.pop_front();
@@ -171,6 +178,10 @@ bool ShellCore::ordersAreOpen() const {
   if (!outbox_.empty()) return true;
   for (std::size_t i = 0; i < posted_.size(); ++i) {
     if (i < news_seen_.channels.size() && news_seen_.channels[i].taken < posted_[i]) return true;
+  }
+  for (std::size_t i = 0; i < posted_marks_.size(); ++i) {
+    if (i < news_seen_.outputs.size() && news_seen_.outputs[i].taken < posted_marks_[i])
+      return true;
   }
   return false;
 }

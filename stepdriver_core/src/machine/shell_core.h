@@ -123,7 +123,8 @@ class ShellCore {
   bool closed_ = false;
 
   std::deque<pulse::Command> outbox_;
-  std::vector<std::uint64_t> posted_;  // serial of the last command, by channel
+  std::vector<std::uint64_t> posted_;        // serial of the last command, by channel
+  std::vector<std::uint64_t> posted_marks_;  // the same, by output
   EngineNews news_seen_;
   // Of the controller, which changes only when it handles an input.
   std::shared_ptr<const MachineSnapshot> snapshot_;

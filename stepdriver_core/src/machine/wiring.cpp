@@ -76,6 +76,16 @@ Wiring::Wiring(const std::vector<config::AxisConfig>& axes, const MachineOptions
   }
 }
 
+std::vector<pulse::OutputLine> Wiring::switchedOutputs(const MachineOptions& options) const {
+  std::vector<pulse::OutputLine> switched;
+  for (std::size_t i = 0; i < options.outputs.size(); ++i) {
+    const config::OutputConfig& output = options.outputs[i];
+    switched.push_back({named_outputs[i], output.active_level, output.min_on_ns, output.min_off_ns,
+                        output.max_on_ns.value_or(pulse::kNever)});
+  }
+  return switched;
+}
+
 pulse::Nanoseconds longestRamp(const std::vector<config::AxisConfig>& axes) {
   double longest = 0.0;
   for (const config::AxisConfig& axis : axes) {

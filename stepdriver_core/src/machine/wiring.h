@@ -39,6 +39,7 @@ struct Wiring {
     if (!motor_power) return {};
     return {*options.motor_power, *motor_power};
   }
+  std::vector<pulse::OutputLine> switchedOutputs(const MachineOptions& options) const;
   NamedLines namedLines(const MachineOptions& options) const {
     return {NamedOutputs(options.outputs, named_outputs),
             NamedInputs(options.inputs, named_inputs)};

@@ -42,11 +42,15 @@ class PinRing {
   void add(int output, bool level, Nanoseconds time) {
     std::atomic<bool>& known = levels_[static_cast<std::size_t>(output)];
     if (known.load(std::memory_order_relaxed) == level) return;
+    addChange(output, level, time);
+  }
+  /// The same of an output that others write too: it is recorded whatever level is known here.
+  void addChange(int output, bool level, Nanoseconds time) {
     if (time - last_.load(std::memory_order_relaxed) > kLongestPause) ring_.clear();
     ring_.add({static_cast<std::uint64_t>(time) << kTimeShift |
                static_cast<std::uint64_t>(output) << 1U | static_cast<std::uint64_t>(level)});
     last_.store(time, std::memory_order_release);
-    known.store(level, std::memory_order_release);
+    levels_[static_cast<std::size_t>(output)].store(level, std::memory_order_release);
   }
 
   /// @param clock of the times that were added.

@@ -6,6 +6,7 @@
 
 #include "channel/channel_config.h"
 #include "channel/channel_state.h"
+#include "profile/marks.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -51,19 +52,45 @@ struct Follow {
   /// @}
 };
 
+/// The marks of an output with a name along a path, for a motion along it that its axes follow. The
+/// engine refuses it with the motions of its command.
+struct FollowMarks {
+  std::size_t output = 0;    ///< by its number in the configuration
+  std::uint64_t serial = 0;  ///< of the orders for this output, above 0
+  std::uint64_t group = 0;   ///< Follow::group of the path
+  /// Live until the output reads a later order, or none, see OutputLineState::reads.
+  const motion::Profile* along = nullptr;
+  const motion::OutputMarks* marks = nullptr;
+  Nanoseconds delay = 0;  ///< of the axes behind the motion along the path
+  /// The path hasn't had the output yet: it begins with its first mark. Otherwise the order does
+  /// nothing if the path's part has ended.
+  bool begins = false;
+  /// @name The state of the output, if it begins
+  /// @{
+  std::uint64_t changes = 0;  ///< OutputLineState::changes, as far as it is known
+  bool on = false;
+  Nanoseconds changed = 0;   ///< clock time of its last change
+  Nanoseconds on_since = 0;  ///< clock time
+  /// @}
+};
+
 /// An order to the pulse thread. Serials rise by one on each channel.
 struct Command {
   /// What it orders.
   enum class Kind {
-    kFollow,   ///< follow the profiles: all of them, or none if one can't be accepted
-    kReserve,  ///< the chip's other pins are being written: make no step, ignore the fault line
-    kRelease,  ///< ends a reservation
+    kFollow,    ///< follow the profiles: all of them, or none if one can't be accepted
+    kReserve,   ///< the chip's other pins are being written: make no step, ignore the fault line
+    kRelease,   ///< ends a reservation
+    kEndMarks,  ///< a path no longer switches an output: what is left of its marks is given up
   };
 
   Kind kind = Kind::kFollow;
   const Follow* follows = nullptr;  ///< for kFollow; valid until the channels have handled it
   std::size_t follow_count = 0;
-  int channel = 0;  ///< for kReserve and kRelease, like all below
+  const FollowMarks* marks = nullptr;  ///< accepted or refused with the profiles; valid as they are
+  std::size_t marks_count = 0;
+  std::size_t output = 0;  ///< for kEndMarks, with the serial
+  int channel = 0;         ///< for kReserve and kRelease, like all below
   std::uint64_t serial = 0;
   Nanoseconds ready = 0;  ///< for kRelease: clock time before which no step goes out
   /// The position of the motor in the microsteps of a new mode.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine_channel.h"
+#include "engine_output.h"
 #include "port/gpio_port.h"
 #include "stepdriver_core/error.h"
 
@@ -218,11 +219,12 @@ Nanoseconds PulseEngine::serve() {
   if (port_.due() <= now || horizon_ != 0) servePort(now);
   scheduleChanged();
   if (horizon_ != 0) tellFollowed(now);
+  const Nanoseconds outputs_due = outputs_.empty() ? kNever : serveOutputs(now);
   if (std::min(dues_.earliest(), port_.due()) <= now) finishDue(now);
   if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
   serveStops();
   report();
-  const Nanoseconds steps_due = std::min(dues_.earliest(), port_.due());
+  const Nanoseconds steps_due = std::min({dues_.earliest(), port_.due(), outputs_due});
   Nanoseconds due = std::min(steps_due, stops_.due([this] { return allSlow(); }));
   if (horizon_ != 0) due = std::min(due, tellDue());
   return heartbeat_ ? std::min(due, heartbeat_->due()) : due;
@@ -259,6 +261,11 @@ void PulseEngine::takeMail(Nanoseconds now) {
 
 void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
   if (command.kind == Command::Kind::kFollow) return followAll(command, now);
+  if (command.kind == Command::Kind::kEndMarks) {
+    EngineOutput& output = *outputs_[command.output];
+    output.end();
+    return output.taken(command.serial);
+  }
   Channel& channel = *channels_[static_cast<std::size_t>(command.channel)];
   if (command.kind == Command::Kind::kRelease) {
     channel.release(command);
@@ -276,6 +283,14 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
   bool may = true;
   for (std::size_t i = 0; i < command.follow_count; ++i) {
     may = may && mayFollow(command.follows[i], now);
+  }
+  for (std::size_t i = 0; i < command.marks_count; ++i) {
+    may = may && outputs_[command.marks[i].output]->mayFollow(command.marks[i]);
+  }
+  for (std::size_t i = 0; i < command.marks_count; ++i) {
+    EngineOutput& output = *outputs_[command.marks[i].output];
+    if (may) output.follow(command.marks[i]);
+    output.taken(command.marks[i].serial);
   }
   for (std::size_t i = 0; may && i < command.follow_count; ++i) {
     const Follow& order = command.follows[i];
@@ -344,6 +359,7 @@ void PulseEngine::readEmergencyStop() {
 }
 
 void PulseEngine::stopAll(Nanoseconds now) {
+  endMarks();
   if (stops_.beginRamp(now)) news_ = true;
   if (stops_.mayRamp(now, [this] { return allSlow(); })) return;
   for (const auto& channel : channels_) {
@@ -407,6 +423,41 @@ bool PulseEngine::askGuards(Channel& channel, Nanoseconds now) {
     }
   }
   return true;
+}
+
+// ---- outputs ----
+
+void PulseEngine::switchOutputs(const std::vector<OutputLine>& outputs) {
+  for (const OutputLine& output : outputs) {
+    outputs_.push_back(std::make_unique<EngineOutput>(output, lines_, clock_));
+  }
+}
+
+OutputLineState PulseEngine::output(std::size_t index) const { return outputs_.at(index)->state(); }
+
+std::size_t PulseEngine::outputs() const { return outputs_.size(); }
+
+// A stop may have come since this pass has begun. @return when it must be called again
+Nanoseconds PulseEngine::serveOutputs(Nanoseconds now) {
+  if (emergencyStopped()) endMarks();
+  Nanoseconds due = kNever;
+  for (const auto& output : outputs_) {
+    if (output->serve(now, state_.slipped, ring_)) news_ = true;
+    due = std::min(due, output->due(state_.slipped));
+  }
+  return due;
+}
+
+void PulseEngine::endMarks() {
+  for (const auto& output : outputs_) {
+    if (output->end()) news_ = true;
+  }
+}
+
+void PulseEngine::endMarksOf(std::uint64_t group) {
+  for (const auto& output : outputs_) {
+    if (output->group() == group && output->end()) news_ = true;
+  }
 }
 
 // ---- steps ----
@@ -626,6 +677,10 @@ void PulseEngine::endEarly(Channel& channel, EndReason reason, Nanoseconds now) 
   const bool abrupt = horizon_ == 0 && channel.motion->isFast(now - state_.slipped);
   kin.drains = kin.open != 0;
   for (const Channel* one : kin.all) kin.unmade = kin.unmade || one->motion->next().has_value();
+  // Before others can see that the motion has ended: then no mark comes.
+  for (const Channel* axis : kin.axes) {
+    if (axis->motion->follows() && axis->group != 0) endMarksOf(axis->group);
+  }
   for (Channel* axis : kin.axes) {
     const bool moved = axis->motion->follows();
     if (!moved && axis != &channel) {

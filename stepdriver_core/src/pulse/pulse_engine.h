@@ -9,6 +9,7 @@
 
 #include "channel/channel_config.h"
 #include "channel/channel_state.h"
+#include "channel/output_line.h"
 #include "channel/watched_lines.h"
 #include "guard/emergency_stops.h"
 #include "port/due_tree.h"
@@ -32,6 +33,7 @@ struct EngineState {
 };
 
 struct EngineChannel;
+class EngineOutput;
 struct Objection;
 class Follower;
 class PinRing;
@@ -140,6 +142,15 @@ class PulseEngine : private StepPort::Listener {
   ///   can't be written, that is a failure of every channel. Set before the first serve().
   void beat(const HeartbeatLine& line) { heartbeat_.emplace(line, clock_.now()); }
 
+  /// @param outputs can be switched by the marks of paths (FollowMarks), by their index here: the
+  ///   pulse thread writes each mark at its time, after the steps of that time. What ends the
+  ///   motions of a group early ends its marks, and an emergency stop ends all of them. Set before
+  ///   the first serve().
+  void switchOutputs(const std::vector<OutputLine>& outputs);
+  /// The state of one of them, consistent and from one instant.
+  OutputLineState output(std::size_t index) const;
+  std::size_t outputs() const;
+
   /// @param ring records each edge of STEP, DIR and heartbeat lines at the end of its write. It
   ///   outlives the engine; set before the first serve().
   void recordTo(PinRing& ring);
@@ -176,6 +187,11 @@ class PulseEngine : private StepPort::Listener {
   void takeCommand(const Command& command, Nanoseconds now);
   void followAll(const Command& command, Nanoseconds now);
   bool mayFollow(const Follow& order, Nanoseconds now) const;
+
+  // Outputs.
+  Nanoseconds serveOutputs(Nanoseconds now);
+  void endMarks();
+  void endMarksOf(std::uint64_t group);
 
   // News.
   void report();
@@ -246,6 +262,7 @@ class PulseEngine : private StepPort::Listener {
   std::vector<std::unique_ptr<Channel>>
       channels_;  // the axes' come first, then those of shared motors
   DueTree dues_;
+  std::vector<std::unique_ptr<EngineOutput>> outputs_;
   // Of one pass: the due channels, and those to schedule.
   std::vector<std::size_t> due_;
   std::vector<Channel*> changed_;

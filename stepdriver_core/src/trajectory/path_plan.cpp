@@ -205,8 +205,10 @@ void setBlends(std::vector<CurveSegment>& segments, const Path& path, std::size_
 }
 
 // @param segments their `blend` becomes that of the plan if more follows.
+// @param marks their places are set.
 PathTiming planAlong(std::vector<CurveSegment>& segments, const std::vector<double>& start,
-                     const std::vector<PathAxis>& axes, bool more_follows) {
+                     const std::vector<PathAxis>& axes, bool more_follows,
+                     std::vector<PathMark>& marks) {
   const bool smooth = hasJerkLimit(axes);
   const Path path(start, segments, resolutionOf(axes),
                   smooth ? Continuity::kCurvature : Continuity::kDirection, more_follows);
@@ -215,6 +217,7 @@ PathTiming planAlong(std::vector<CurveSegment>& segments, const std::vector<doub
       timingLimits(axes, more_follows ? QueuedPath::kShareOfLimits : 1.0);
   PathTiming plan = smooth ? planJerkLimited(path, limits) : planAccelerationLimited(path, limits);
   if (more_follows) setBlends(segments, path, 0, plan.stops);
+  if (!marks.empty()) setPlaces(marks, 0, path, plan.knots, 0);
   return plan;
 }
 
@@ -232,11 +235,17 @@ PathTiming restAt(const std::vector<double>& place, bool smooth) {
 }
 
 PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
-                  const std::vector<PathOrigin>& origins) {
+                  const std::vector<PathOrigin>& origins,
+                  const std::vector<config::OutputConfig>& outputs) {
   requireRequest(request);
   const bool smooth = hasJerkLimit(axes);
   PathWindow window;
-  window.frame = {request.names, {}, request.velocity, request.tolerance};
+  window.frame = {
+      request.names,
+      {},
+      request.velocity,
+      request.tolerance,
+      std::make_shared<const std::vector<PathOutput>>(pathOutputs(outputs, request.leads))};
   window.axes = axes;
   const BeginOfPath begin = beginOf(request.segments.front(), axes, origins, smooth);
   window.start = begin.place;
@@ -246,13 +255,16 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
   PathReader reader(window.frame, axes, window.start);
   window.segments.reserve(request.segments.size());
   for (const PathSegment& given : request.segments) reader.read(given, window.segments);
+  window.marks = reader.takeMarks();
   try {
     PathTiming planned;
     if (window.segments.empty()) {
       planned = restAt(window.start, smooth);
     } else {
-      planned = planAlong(window.segments, window.start, axes, request.more_follows);
+      planned = planAlong(window.segments, window.start, axes, request.more_follows, window.marks);
     }
+    for (PathMark& mark : window.marks) mark.place_ns += begin.delay_ns;
+    requireRates(window.marks, *window.frame.outputs);
     for (TimingKnot& knot : planned.knots) knot.time_ns += begin.delay_ns;
     planned.settled_ns += begin.delay_ns;
     const std::vector<double> end = window.end();
@@ -261,6 +273,7 @@ PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
       plan.targets.push_back(axes[k].countOf(end[k]));
     }
     plan.points = pointsOf(planned.knots, axes, end, window.segments);
+    plan.marks = marksByOutput(window.marks, *window.frame.outputs, window.marks_passed);
     if (request.more_follows) {
       window.settled_ns = planned.settled_ns;
       appendKnots(window.knots, planned.knots, 0, 0);

@@ -24,15 +24,18 @@ struct PathPlan {
   /// ends between two of them, the last piece brings the axes there, without a step.
   std::vector<TrajectoryPoint> points;
   std::vector<double> targets;               ///< [microsteps] the end of the path for each axis
+  std::shared_ptr<const PathMarks> marks;    ///< nullptr: there are none
   std::shared_ptr<const PathWindow> window;  ///< only with PathRequest::more_follows
 };
 
 /// Plans the trajectory along a path.
 ///
-/// @param axes, origins one for each name of the request.
+/// @param axes, origins one for each name of the request. @param outputs all outputs of the
+/// machine.
 /// @throw Refused as Machine::followPath(), except for what PreparedTrajectory finds.
 PathPlan planPath(const PathRequest& request, const std::vector<PathAxis>& axes,
-                  const std::vector<PathOrigin>& origins);
+                  const std::vector<PathOrigin>& origins,
+                  const std::vector<config::OutputConfig>& outputs = {});
 
 /// @name The steps of planPath()
 /// @{

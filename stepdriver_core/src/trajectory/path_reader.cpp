@@ -8,6 +8,7 @@
 
 #include "message_text.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/printable.h"
 
 namespace stepdriver::motion {
 
@@ -30,6 +31,7 @@ std::string segmentText(std::size_t index) { return fmt::format("segment {} of t
 
 void PathReader::read(const PathSegment& given, std::vector<CurveSegment>& segments) {
   CurveSegment segment = segmentOf(given);
+  if (!given.outputs.empty()) readOutputs(given, segments.size());
   ++index_;
   if (!leadsNowhere(given, segment)) {
     before_ = segment.end;
@@ -60,6 +62,30 @@ CurveSegment PathReader::segmentOf(const PathSegment& given) const {
   segment.tolerance = given.tolerance.value_or(frame_.tolerance);
   requirePositive("tolerance", segment.tolerance);
   return segment;
+}
+
+void PathReader::readOutputs(const PathSegment& given, std::size_t segment) {
+  const std::vector<PathOutput>& outputs = *frame_.outputs;
+  const std::size_t first = marks_.size();
+  for (const OutputSwitch& wanted : given.outputs) {
+    const auto found = std::find_if(outputs.begin(), outputs.end(), [&](const PathOutput& output) {
+      return output.name == wanted.output;
+    });
+    if (found == outputs.end()) {
+      refuse(fmt::format("switches the output {}, but {}", printable(wanted.output),
+                         outputsText(outputs)));
+    }
+    const auto number = static_cast<std::size_t>(found - outputs.begin());
+    const bool twice =
+        std::any_of(marks_.begin() + static_cast<std::ptrdiff_t>(first), marks_.end(),
+                    [&](const PathMark& mark) { return mark.output == number; });
+    if (twice) refuse(fmt::format("switches the output {} twice", wanted.output));
+    PathMark& mark = marks_.emplace_back();
+    mark.segment = segment;
+    mark.output = number;
+    mark.on = wanted.on;
+    mark.number = index_;
+  }
 }
 
 void PathReader::refuse(const std::string& why) const {

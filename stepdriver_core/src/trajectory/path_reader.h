@@ -2,11 +2,14 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "geometry/path.h"
 #include "path_axis.h"
+#include "path_marks.h"
 #include "stepdriver_core/trajectory/requests.h"
 
 namespace stepdriver::motion {
@@ -17,6 +20,8 @@ struct PathFrame {
   std::vector<double> zero;        ///< [unit] positions of the segments count from here
   double velocity = 0.0;           ///< see PathRequest
   double tolerance = 0.0;
+  /// All outputs of the machine, by their numbers.
+  std::shared_ptr<const std::vector<PathOutput>> outputs;
 };
 
 /// Reads the segments of a path, one after the other, and checks them.
@@ -25,6 +30,10 @@ class PathReader {
   /// @param frame, axes outlive this. @param from [unit] where the first segment begins.
   PathReader(const PathFrame& frame, const std::vector<PathAxis>& axes, std::vector<double> from)
       : frame_(frame), axes_(axes), before_(std::move(from)) {}
+
+  /// Where outputs are switched along the segments that were read, without their times. A segment
+  /// is counted as it was appended.
+  std::vector<PathMark> takeMarks() { return std::move(marks_); }
 
   /// Appends a segment to those of its path, unless it makes no step because it leads nowhere: then
   /// the corner before it is rounded by no more than its own tolerance.
@@ -44,6 +53,7 @@ class PathReader {
                      const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
   bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
                const std::array<double, 2>& to) const;
+  void readOutputs(const PathSegment& given, std::size_t segment);
   bool leadsNowhere(const PathSegment& given, const CurveSegment& segment) const;
   void requireRate(double velocity, double finest, const char* unit) const;
   void readSpeed(const PathSegment& given, CurveSegment& segment) const;
@@ -54,6 +64,7 @@ class PathReader {
   const std::vector<PathAxis>& axes_;
   std::vector<double> before_;  // [unit] the end of the segment before
   std::size_t index_ = 0;
+  std::vector<PathMark> marks_;
 };
 
 /// "segment 3 of the path"

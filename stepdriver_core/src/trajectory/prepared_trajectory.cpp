@@ -172,8 +172,9 @@ double endVelocity(const Profile& profile) {
 
 PreparedTrajectory::PreparedTrajectory(std::vector<PathAxis> axes,
                                        const std::vector<TrajectoryPoint>& points,
-                                       const std::vector<MotionState>& expected, bool allow_slower)
-    : axes_(std::move(axes)), allow_slower_(allow_slower) {
+                                       const std::vector<MotionState>& expected, bool allow_slower,
+                                       std::shared_ptr<const PathMarks> marks)
+    : axes_(std::move(axes)), allow_slower_(allow_slower), marks_(std::move(marks)) {
   if (points.empty()) axes_.front().refuse("the trajectory has no points");
   requirePoints(points);
   lone_position_ = onlyPositionsCount(points);
@@ -534,7 +535,7 @@ std::shared_ptr<const SharedPath> PreparedTrajectory::joinAll(
   for (std::size_t i = 0; i < starts.size(); ++i) {
     members.push_back(joinMember(own, i, starts[i], heads[i], remedy));
   }
-  return std::make_shared<const TrajectoryPath>(std::move(members));
+  return std::make_shared<const TrajectoryPath>(std::move(members), DoubleDouble(), marks_);
 }
 
 }  // namespace stepdriver::motion

@@ -36,10 +36,12 @@ class PreparedTrajectory {
   ///   begin. Velocities of points without them, and the factor, depend on it; the path begins in
   ///   the actual state nevertheless.
   /// @param allow_slower whether the times of the points may become longer.
+  /// @param marks where outputs are switched along it; nullptr: nowhere.
   /// @throw Refused if no trajectory has such points, or if an axis can't do its part after the
   ///   first segment.
   PreparedTrajectory(std::vector<PathAxis> axes, const std::vector<TrajectoryPoint>& points,
-                     const std::vector<MotionState>& expected, bool allow_slower = false);
+                     const std::vector<MotionState>& expected, bool allow_slower = false,
+                     std::shared_ptr<const PathMarks> marks = nullptr);
   PreparedTrajectory(const PreparedTrajectory&) = delete;
   PreparedTrajectory& operator=(const PreparedTrajectory&) = delete;
 
@@ -114,6 +116,7 @@ class PreparedTrajectory {
   bool lone_position_ = false;   // there is a single point, and only its positions count
   bool has_velocities_ = false;  // all points have velocities
   bool allow_slower_ = false;
+  std::shared_ptr<const PathMarks> marks_;
 };
 
 }  // namespace stepdriver::motion

@@ -78,6 +78,7 @@ struct QueuedPath::Start {
 
 struct QueuedPath::Continuation {
   std::vector<CurveSegment> segments;  // the segments from that of the start on
+  std::vector<PathMark> marks;         // the marks after the start, with their places
   PathTiming plan;
   std::vector<PathStart> states;
 };
@@ -114,14 +115,17 @@ std::vector<double> QueuedPath::targets() const {
   return targets;
 }
 
-std::vector<CurveSegment> QueuedPath::read(const std::vector<PathSegment>& given) const {
+QueuedPath::Added QueuedPath::read(const std::vector<PathSegment>& given) const {
   const std::vector<double>& end = window_->end();
   PathReader reader(window_->frame, window_->axes, end);
-  std::vector<CurveSegment> added;
-  added.reserve(given.size());
-  for (const PathSegment& segment : given) reader.read(segment, added);
-  if (!added.empty()) {
-    requireRange(Path(end, added, resolutionOf(window_->axes)), window_->axes, added);
+  Added added;
+  std::vector<CurveSegment>& segments = added.segments;
+  segments.reserve(given.size());
+  for (const PathSegment& segment : given) reader.read(segment, segments);
+  added.marks = reader.takeMarks();
+  for (PathMark& mark : added.marks) mark.segment += window_->segments.size();
+  if (!segments.empty()) {
+    requireRange(Path(end, segments, resolutionOf(window_->axes)), window_->axes, segments);
   }
   return added;
 }
@@ -284,9 +288,9 @@ std::vector<CurveSegment> QueuedPath::aroundStart(const Start& start, std::size_
 }
 
 // The motion along the rest of the path; empty if the axes can't follow it from there.
-std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
-    Start start, const std::vector<CurveSegment>& added, bool more_follows,
-    int most_halvings) const {
+std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(Start start, const Added& added,
+                                                                 bool more_follows,
+                                                                 int most_halvings) const {
   const std::vector<CurveSegment>& old = window_->segments;
   const std::vector<PathAxis>& axes = window_->axes;
   const bool smooth = hasJerkLimit(axes);
@@ -297,7 +301,7 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
   const std::vector<double>& from = first == 0 ? window_->start : old[first - 1].end;
   std::vector<CurveSegment> segments = aroundStart(start, first);
   const std::size_t corner = segments.size();  // the number of the segment after it
-  segments.insert(segments.end(), added.begin(), added.end());
+  segments.insert(segments.end(), added.segments.begin(), added.segments.end());
   const double resolution = resolutionOf(axes);
   const std::vector<TimingLimits> limits = timingLimits(axes, kShareOfLimits);
   const bool in_last = corner == before + 1;
@@ -323,11 +327,24 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(
     if (made.plan.excess * kShareOfLimits <= 1.0 + kNoExcessFromSpeed) {
       made.segments.assign(segments.begin() + static_cast<std::ptrdiff_t>(before), segments.end());
       setBlends(made.segments, path, before, made.plan.stops);
+      made.marks = marksAfter(start, added);
+      setPlaces(made.marks, start.segment, rest, made.plan.knots, start.time_ns);
       return made;
     }
     if (corner == before) break;
   }
   return std::nullopt;
+}
+
+// Those that the new plan passes at other times: all new ones, and those beyond the start.
+std::vector<PathMark> QueuedPath::marksAfter(const Start& start, const Added& added) const {
+  std::vector<PathMark> marks;
+  for (const PathMark& mark : window_->marks) {
+    if (mark.segment > start.segment) marks.push_back(mark);
+  }
+  for (PathMark& mark : marks) mark.appended_to = true;
+  marks.insert(marks.end(), added.marks.begin(), added.marks.end());
+  return marks;
 }
 
 QueuedPath::JointPlace QueuedPath::jointAt(const Start& start, const PathPoint& place) const {
@@ -345,10 +362,10 @@ QueuedPath::JointPlace QueuedPath::jointAt(const Start& start, const PathPoint& 
 
 // The motion so far, without the part that is passed, and the new motion from the start on; null if
 // there is no room to take up a backlash.
-std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
-                                                         const Continuation& continuation,
-                                                         const std::vector<TrajectoryPoint>& points,
-                                                         std::int64_t passed_ns) const {
+std::shared_ptr<const TrajectoryPath> QueuedPath::joined(
+    const Start& start, const Continuation& continuation,
+    const std::vector<TrajectoryPoint>& points, std::int64_t passed_ns,
+    std::shared_ptr<const PathMarks> marks) const {
   const DoubleDouble passed = secondsOf(passed_ns);
   std::vector<TrajectoryPath::Member> members = motion_->members();
   const bool smooth = hasJerkLimit(window_->axes);
@@ -388,7 +405,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(const Start& start,
     }
     members[k].curve = std::make_shared<const Profile>(0, std::move(pieces));
   }
-  return std::make_shared<const TrajectoryPath>(std::move(members), passed);
+  return std::make_shared<const TrajectoryPath>(std::move(members), passed, std::move(marks));
 }
 
 QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments, bool more_follows,
@@ -408,8 +425,9 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
         segments.size(), ahead.segments, ahead.room));
   }
   try {
-    const std::vector<CurveSegment> added = read(segments);
+    const Added added = read(segments);
     if (added.empty()) return unchanged();
+    if (added.segments.empty()) return withMarksAtEnd(added.marks, more_follows, passed);
     const std::int64_t changeable_ns = std::max(nanoseconds(changeable), passed_ns);
     const std::vector<Start> starts = startsFrom(changeable_ns);
     // With a jerk limit, a later start is better than a corner that is rounded less.
@@ -434,12 +452,13 @@ QueuedPath::Longer QueuedPath::extended(const std::vector<PathSegment>& segments
 }
 
 QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation continuation,
-                                         const std::vector<CurveSegment>& added, bool more_follows,
+                                         const Added& added, bool more_follows,
                                          std::int64_t passed_ns) const {
   const double delay = start.from_rest.value_or(0.0);
   if (delay > 0.0) {
     const auto delay_ns = static_cast<std::int64_t>(std::ceil(delay * 1e9));
     for (TimingKnot& knot : continuation.plan.knots) knot.time_ns += delay_ns;
+    for (PathMark& mark : continuation.marks) mark.place_ns += delay_ns;
     continuation.plan.settled_ns += delay_ns;
   }
   PathWindow window;
@@ -464,19 +483,61 @@ QueuedPath::Longer QueuedPath::continued(const Start& start, Continuation contin
   }
   appendKnots(window.knots, continuation.plan.knots, start.time_ns, start.segment - dropped);
   window.settled_ns = start.time_ns + continuation.plan.settled_ns;
+  keepMarks(window, start, dropped, std::move(continuation.marks), passed_ns);
   // Refusals count the segments from the first appended one.
-  const std::size_t old = continuation.segments.size() - added.size();
+  const std::size_t old = continuation.segments.size() - added.segments.size();
   for (std::size_t i = 0; i < old; ++i) continuation.segments[i].number = 0;
   const std::vector<TrajectoryPoint> points =
       pointsOf(std::move(continuation.plan.knots), window_->axes, window.segments.back().end,
                continuation.segments);
   continuation.plan.knots.clear();
-  auto motion = joined(start, continuation, points, passed_ns);
+  auto motion = joined(start, continuation, points, passed_ns,
+                       marksByOutput(window.marks, *window.frame.outputs, window.marks_passed));
   if (!motion) return {};
   return {
       std::make_shared<const QueuedPath>(
           std::move(motion), std::make_shared<const PathWindow>(std::move(window)), more_follows),
       static_cast<double>(passed_ns) * 1e-9, static_cast<double>(start.time_ns) * 1e-9, true};
+}
+
+// Marks come after their places: by what a shaper delays, or because an output keeps its least
+// times. So those that were passed long ago are left out, and no others.
+void QueuedPath::keepMarks(PathWindow& window, const Start& start, std::size_t dropped,
+                           std::vector<PathMark> later, std::int64_t passed_ns) const {
+  constexpr std::int64_t kLongAgo = 60'000'000'000;
+  std::int64_t margin = kLongAgo;
+  for (const PathOutput& output : *window.frame.outputs) {
+    margin = std::max({margin, kLongAgo + output.min_on_ns, kLongAgo + output.min_off_ns});
+  }
+  window.marks_passed = window_->marks_passed;
+  window.marks_passed.resize(window.frame.outputs->size());
+  for (const PathMark& mark : window_->marks) {
+    if (mark.segment > start.segment) continue;
+    if (mark.place_ns < passed_ns - margin) {
+      ++window.marks_passed[mark.output];
+    } else {
+      window.marks.push_back(mark);
+      window.marks.back().appended_to = true;
+    }
+  }
+  window.marks.insert(window.marks.end(), later.begin(), later.end());
+  requireRates(window.marks, *window.frame.outputs);
+  for (PathMark& mark : window.marks) mark.segment -= std::min(mark.segment, dropped);
+}
+
+// What was appended leads nowhere, and switches outputs at the end of the path.
+QueuedPath::Longer QueuedPath::withMarksAtEnd(std::vector<PathMark> added, bool more_follows,
+                                              double passed) const {
+  auto window = std::make_shared<PathWindow>(*window_);
+  for (PathMark& mark : added) mark.place_ns = window_->knots.back().time_ns;
+  for (PathMark& mark : window->marks) mark.appended_to = true;
+  window->marks.insert(window->marks.end(), added.begin(), added.end());
+  requireRates(window->marks, *window->frame.outputs);
+  auto motion = std::make_shared<const TrajectoryPath>(
+      motion_->members(), motion_->origin(),
+      marksByOutput(window->marks, *window->frame.outputs, window->marks_passed));
+  return {std::make_shared<const QueuedPath>(std::move(motion), std::move(window), more_follows),
+          passed, motion_->end().value(), true};
 }
 
 }  // namespace stepdriver::motion

@@ -41,6 +41,9 @@ struct PathWindow {
   std::vector<CurveSegment> segments;
   std::vector<Knot> knots;      ///< the last one is the end of the path
   std::int64_t settled_ns = 0;  ///< see motion::PathTiming
+  /// Where outputs are switched, by place; of those that are passed, only the last ones.
+  std::vector<PathMark> marks;
+  std::vector<std::uint64_t> marks_passed;  ///< by output: marks that were left out
 
   /// The end of the last segment; the start if no segment has made a step yet.
   const std::vector<double>& end() const { return segments.empty() ? start : segments.back().end; }
@@ -99,6 +102,7 @@ class QueuedPath : public SharedPath {
     return motion_->profileOf(member, path);
   }
   bool waitsAtEnd() const override { return more_follows_; }
+  std::shared_ptr<const PathMarks> marks() const override { return motion_->marks(); }
 
  private:
   struct Start;
@@ -109,7 +113,15 @@ class QueuedPath : public SharedPath {
     std::vector<double> velocity;
   };
 
-  std::vector<CurveSegment> read(const std::vector<PathSegment>& given) const;
+  // Segments that are appended, and the marks on them.
+  struct Added {
+    std::vector<CurveSegment> segments;
+    std::vector<PathMark> marks;
+
+    bool empty() const { return segments.empty() && marks.empty(); }
+  };
+
+  Added read(const std::vector<PathSegment>& given) const;
   std::size_t segmentAt(std::int64_t time_ns) const;
   std::size_t firstRoundedInto(std::size_t segment) const;
   std::vector<CurveSegment> aroundStart(const Start& start, std::size_t first) const;
@@ -117,17 +129,21 @@ class QueuedPath : public SharedPath {
   static Start atKnot(const PathWindow::Knot& knot);
   Start onStraight(std::size_t knot, std::int64_t time_ns) const;
   Start atRest() const;
-  std::optional<Continuation> continueFrom(Start start, const std::vector<CurveSegment>& added,
-                                           bool more_follows, int most_halvings) const;
-  Longer continued(const Start& start, Continuation continuation,
-                   const std::vector<CurveSegment>& added, bool more_follows,
-                   std::int64_t passed_ns) const;
+  std::optional<Continuation> continueFrom(Start start, const Added& added, bool more_follows,
+                                           int most_halvings) const;
+  Longer continued(const Start& start, Continuation continuation, const Added& added,
+                   bool more_follows, std::int64_t passed_ns) const;
+  void keepMarks(PathWindow& window, const Start& start, std::size_t dropped,
+                 std::vector<PathMark> later, std::int64_t passed_ns) const;
+  Longer withMarksAtEnd(std::vector<PathMark> added, bool more_follows, double passed) const;
+  std::vector<PathMark> marksAfter(const Start& start, const Added& added) const;
   JointPlace jointAt(const Start& start, const PathPoint& place) const;
   void adjust(Start& start, const PathPoint& planned, const std::vector<PathStart>& states) const;
   std::optional<std::vector<PathStart>> statesAt(const Start& start, const JointPlace& joint) const;
   std::shared_ptr<const TrajectoryPath> joined(const Start& start, const Continuation& continuation,
                                                const std::vector<TrajectoryPoint>& points,
-                                               std::int64_t passed_ns) const;
+                                               std::int64_t passed_ns,
+                                               std::shared_ptr<const PathMarks> marks) const;
 
   std::shared_ptr<const TrajectoryPath> motion_;
   std::shared_ptr<const PathWindow> window_;

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 
+#include "profile/marks.h"
 #include "profile/profile.h"
 
 namespace stepdriver::motion {
@@ -27,6 +29,9 @@ class SharedPath {
   virtual MotionState restart(DoubleDouble position) const { return {position, 0.0, 0.0}; }
   /// Whether the axes wait at its end for another path that continues it.
   virtual bool waitsAtEnd() const { return false; }
+  /// Where outputs are switched along it; nullptr: nowhere. Only a path whose positions are its own
+  /// times at full rate has marks.
+  virtual std::shared_ptr<const PathMarks> marks() const { return nullptr; }
   /// The motion along the path to its end, from a position on it.
   virtual Profile plan(std::int64_t at, const MotionState& from, double speed_override) const = 0;
   /// The motion along the path to rest.

@@ -35,8 +35,9 @@ double timeToRate(const Profile& path, double rate) {
 
 }  // namespace
 
-TrajectoryPath::TrajectoryPath(std::vector<Member> members, DoubleDouble origin)
-    : members_(std::move(members)), origin_(origin) {
+TrajectoryPath::TrajectoryPath(std::vector<Member> members, DoubleDouble origin,
+                               std::shared_ptr<const PathMarks> marks)
+    : members_(std::move(members)), origin_(origin), marks_(std::move(marks)) {
   endTogether();
 }
 

@@ -24,7 +24,8 @@ class TrajectoryPath : public SharedPath {
 
   /// @param members at least one. @param origin [s] the position on the path at which the curves
   ///   start.
-  explicit TrajectoryPath(std::vector<Member> members, DoubleDouble origin = {});
+  explicit TrajectoryPath(std::vector<Member> members, DoubleDouble origin = {},
+                          std::shared_ptr<const PathMarks> marks = nullptr);
 
   const std::vector<Member>& members() const { return members_; }
   DoubleDouble origin() const { return origin_; }
@@ -32,6 +33,7 @@ class TrajectoryPath : public SharedPath {
   DoubleDouble end() const { return origin_ + members_.front().curve->duration(); }
 
   MotionState begin() const override { return {origin_, 1.0, 0.0}; }
+  std::shared_ptr<const PathMarks> marks() const override { return marks_; }
   /// Continues at full rate if all axes are at rest at that position anyway.
   MotionState restart(DoubleDouble position) const override;
   Profile plan(std::int64_t at, const MotionState& from, double speed_override) const override;
@@ -60,6 +62,7 @@ class TrajectoryPath : public SharedPath {
 
   std::vector<Member> members_;
   const DoubleDouble origin_;
+  const std::shared_ptr<const PathMarks> marks_;
 };
 
 }  // namespace stepdriver::motion

@@ -134,7 +134,7 @@ class Hull {
  public:
   explicit Hull(const Drawn& drawn) {
     motion::PathFrame frame{
-        drawn.request.names, {0.0, 0.0}, drawn.request.velocity, drawn.request.tolerance};
+        drawn.request.names, {0.0, 0.0}, drawn.request.velocity, drawn.request.tolerance, {}};
     motion::PathReader reader(frame, drawn.axes, {0.0, 0.0});
     std::vector<motion::CurveSegment> segments;
     for (const PathSegment& segment : drawn.request.segments) reader.read(segment, segments);

@@ -57,7 +57,7 @@ class ByHand : public ShellCore::Host, public pulse::NewsListener {
   const activity::Reply& answer(activity::CallId call) const { return answers_.at(call); }
   /// The engine says that the motion has ended, and nothing about a fault.
   void endMotion(pulse::EndReason end) {
-    EngineNews news{0, 0, 0, {engine_.channel(0)}};
+    EngineNews news{0, 0, 0, {engine_.channel(0)}, {}};
     pulse::ChannelState& state = news.channels.front();
     state.ended = state.following;
     state.following = 0;

@@ -279,6 +279,7 @@ Participants::Participants(const Schedule& schedule)
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
                                                    wiring_.emergency_stop, wiring_.shared);
   }
+  engine_->switchOutputs(wiring_.switchedOutputs(optionsOf(schedule.variant)));
   if (schedule.variant == kSharing) oracle_.share({0, 1});
   controller_ = std::make_unique<machine::Controller>(
       configs_, wiring_.motor_lines, std::move(names), wiring_.emergency_stop,

@@ -138,6 +138,10 @@ struct MoveResult {
   std::string message;    ///< a sentence that says how and where
   double position = 0.0;  ///< [unit] where the axis stands
   double duration = 0.0;  ///< [s] the time that the motion took
+  /// Places at which its path switched outputs, and those at which it didn't because it ended
+  /// before, see motion::PathSegment::outputs.
+  std::uint64_t marks_made = 0;
+  std::uint64_t marks_not_made = 0;
 };
 
 /// A motion that was accepted.

@@ -29,6 +29,8 @@ struct CoordinatedResult {
   std::string message;            ///< a sentence that says how, and names the axis that ended it
   std::vector<double> positions;  ///< [unit] where the members stand
   double duration = 0.0;          ///< [s] the time that it took
+  std::uint64_t marks_made = 0;   ///< as those of its members
+  std::uint64_t marks_not_made = 0;
 };
 
 /// How such a motion ended, from how each of its axes ended it: for a move that outlived its

@@ -54,6 +54,21 @@ struct TrajectoryRequest {
   double begin_in = 0.0;
 };
 
+/// Switches an output with a name.
+struct OutputSwitch {
+  std::string output;
+  bool on = false;
+};
+
+/// How much earlier than at their places a path switches an output: what a valve or a pump needs.
+/// Nothing is switched before the path begins.
+struct OutputLead {
+  std::string output;
+  double on = 0.0;   ///< [s] 0 to kMostLead
+  double off = 0.0;  ///< [s]
+};
+constexpr double kMostLead = 10.0;  ///< [s]
+
 /// A segment of a path, from the end of the one before it; the first begins where the axes stand.
 /// Positions have one number for each name of the path [unit].
 struct PathSegment {
@@ -86,6 +101,11 @@ struct PathSegment {
   double velocity = 0.0;  ///< as PathRequest::velocity; 0: that one
   /// [unit] PathRequest::tolerance for the corner at its end; empty: that one.
   std::optional<double> tolerance;
+
+  /// Outputs that are switched where it begins, each at most once: in the middle of a corner that
+  /// is rounded, and without a stop. A segment that leads nowhere switches them where it is, for
+  /// example at the end of a path.
+  std::vector<OutputSwitch> outputs{};
 };
 
 /// @name See PathSegment::Shape::kArcAround
@@ -112,6 +132,8 @@ struct PathRequest {
   double tolerance = 0.0;
   /// More segments will be appended, see Machine::appendPath(): the axes wait at its end.
   bool more_follows = false;
+  /// For outputs of its segments, also of those that are appended; the others have none.
+  std::vector<OutputLead> leads{};
 };
 
 /// A path of more segments is refused, and so many may lie ahead of the axes: give it in parts.

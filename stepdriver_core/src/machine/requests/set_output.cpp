@@ -15,7 +15,7 @@ void SetOutput::serve(RequestContext& machine, const SharedCall& call) const {
   const std::string why = machine.whySafe();
   if (!why.empty()) throw Refused(fmt::format("the output {}: {}", printable(name), why));
   machine.refuseWhileEmergencyStopInput();
-  machine.named.outputs.set(name, on, call);
+  machine.named.outputs.set(machine.context, name, on, call);
 }
 
 }  // namespace stepdriver::machine

@@ -1,0 +1,196 @@
+#include "path_outputs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "context.h"
+#include "message_text.h"
+#include "stepdriver_core/error.h"
+
+namespace stepdriver::activity {
+
+std::uint64_t MarksOfPath::made() const {
+  std::uint64_t sum = 0;
+  for (const Part& part : parts) sum += part.made;
+  return sum;
+}
+
+std::uint64_t MarksOfPath::notMade() const {
+  std::uint64_t sum = 0;
+  for (const Part& part : parts) sum += part.all - part.made;
+  return sum;
+}
+
+std::string MarksOfPath::text() const {
+  std::string text;
+  for (const Part& part : parts) {
+    if (part.made == part.all) continue;
+    text += fmt::format("; {} wasn't switched at {} of its {} places", part.name,
+                        part.all - part.made, part.all);
+  }
+  return text;
+}
+
+PathOutputs::PathOutputs(const std::vector<config::OutputConfig>& outputs) {
+  for (const config::OutputConfig& config : outputs) {
+    Output& output = outputs_.emplace_back();
+    output.config = config;
+    output.line.why_not = "the machine has not begun";
+  }
+}
+
+// ---- the engine ----
+
+void PathOutputs::update(const std::vector<pulse::OutputLineState>& states) {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    Output& output = outputs_[i];
+    const pulse::OutputLineState& state = output.state = states.at(i);
+    while (!output.kept.empty() && output.kept.front().serial <= state.taken &&
+           (state.reads == 0 || output.kept.front().serial < state.reads)) {
+      output.kept.pop_front();
+    }
+    for (const std::weak_ptr<MarksOfPath>& held : paths_) {
+      const std::shared_ptr<MarksOfPath> path = held.lock();
+      if (!path) continue;
+      for (MarksOfPath::Part& part : path->parts) {
+        if (part.output != i) continue;
+        if (state.group == path->group) part.made = state.made;
+        if (state.ended == path->group) part.made = state.ended_made;
+      }
+    }
+    if (output.taken_by && output.taken_by->ends && state.taken >= *output.taken_by->ends) {
+      output.taken_by.reset();
+    }
+  }
+  paths_.erase(
+      std::remove_if(paths_.begin(), paths_.end(),
+                     [](const std::weak_ptr<MarksOfPath>& path) { return path.expired(); }),
+      paths_.end());
+}
+
+// ---- the owner of a line ----
+
+std::string PathOutputs::holder(std::size_t output) const {
+  const auto& axes = outputs_[output].taken_by->axes;
+  return "a path of " + joinedText(axes, [](const axis::AxisModel* axis) { return axis->name(); });
+}
+
+void PathOutputs::end(Context& context, std::size_t number) {
+  Output& output = outputs_[number];
+  if (!output.taken_by || output.taken_by->ends) return;
+  output.taken_by->ends = ++output.serial;
+  pulse::Command& command = context.out->commands.emplace_back();
+  command.kind = pulse::Command::Kind::kEndMarks;
+  command.output = number;
+  command.serial = output.serial;
+}
+
+std::optional<bool> PathOutputs::takeWanted(std::size_t output) {
+  return std::exchange(outputs_[output].wanted, std::nullopt);
+}
+
+// ---- a path ----
+
+void PathOutputs::refuseUnlessFree(const motion::PathMarks& marks, std::uint64_t group,
+                                   const std::vector<const axis::AxisModel*>& axes) const {
+  for (const motion::OutputMarks& own : marks) {
+    const Output& output = outputs_.at(own.output);
+    if (has(output, group) && !output.taken_by->ends) continue;
+    if (output.taken_by) {
+      const auto& others = output.taken_by->axes;
+      const bool is_replaced = std::any_of(axes.begin(), axes.end(), [&](const auto* axis) {
+        return std::find(others.begin(), others.end(), axis) != others.end();
+      });
+      if (is_replaced || output.taken_by->ends) continue;
+      throw Refused(
+          fmt::format("the output {}: {} switches it", output.config.name, holder(own.output)));
+    }
+    if (!output.line.why_not.empty()) {
+      throw Refused(fmt::format("the output {}: {}", output.config.name, output.line.why_not));
+    }
+  }
+}
+
+void PathOutputs::take(const motion::PathMarks& marks, const std::shared_ptr<MarksOfPath>& path,
+                       const std::vector<const axis::AxisModel*>& axes) {
+  refuseUnlessFree(marks, path->group, axes);
+  if (path->parts.empty()) paths_.emplace_back(path);
+  for (const motion::OutputMarks& own : marks) {
+    Output& output = outputs_.at(own.output);
+    if (!has(output, path->group)) {
+      output.taken_by = Taken{path->group, axes, {}};
+      output.wanted.reset();
+    }
+    const auto part = std::find_if(path->parts.begin(), path->parts.end(),
+                                   [&](const auto& each) { return each.output == own.output; });
+    if (part != path->parts.end()) {
+      part->all = own.end();
+    } else {
+      path->parts.push_back({own.output, output.config.name, own.end(), 0});
+    }
+  }
+}
+
+pulse::Nanoseconds PathOutputs::mayBegin(const motion::PathMarks& marks) const {
+  pulse::Nanoseconds earliest = 0;
+  for (const motion::OutputMarks& own : marks) {
+    const Output& output = outputs_.at(own.output);
+    if (own.marks.empty() || own.marks.front().on == output.line.on) continue;
+    const motion::Mark& first = own.marks.front();
+    const pulse::Nanoseconds free =
+        output.line.changed + (output.line.on ? output.config.min_on_ns : output.config.min_off_ns);
+    const pulse::Nanoseconds after = std::max<std::int64_t>(0, first.place_ns - own.lead(first));
+    earliest = std::max(earliest, free - after);
+  }
+  return earliest;
+}
+
+void PathOutputs::order(std::uint64_t group, const std::shared_ptr<const motion::Profile>& along,
+                        const std::shared_ptr<const motion::PathMarks>& marks,
+                        pulse::Nanoseconds delay,
+                        const std::shared_ptr<std::vector<pulse::FollowMarks>>& command) {
+  for (const motion::OutputMarks& own : *marks) {
+    Output& output = outputs_.at(own.output);
+    if (!has(output, group) || output.taken_by->ends) continue;
+    pulse::FollowMarks& follow = command->emplace_back();
+    follow.output = own.output;
+    follow.serial = ++output.serial;
+    follow.group = group;
+    follow.along = along.get();
+    follow.marks = &own;
+    follow.delay = delay;
+    follow.begins = output.state.group != group && output.state.ended != group;
+    follow.changes = output.state.changes;
+    follow.on = output.line.on;
+    follow.changed = output.line.changed;
+    follow.on_since = output.line.on_since;
+    output.kept.push_back({follow.serial, along, marks, command});
+  }
+}
+
+bool PathOutputs::isDue(std::uint64_t group) const {
+  return std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& output) {
+    return has(output, group) && !output.taken_by->ends && output.state.group == group &&
+           output.state.due;
+  });
+}
+
+void PathOutputs::stop(Context& context, std::uint64_t group) {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    Output& output = outputs_[i];
+    if (!has(output, group) || output.taken_by->ends || !output.config.at_stop) continue;
+    end(context, i);
+    output.wanted = output.config.at_stop;
+  }
+}
+
+void PathOutputs::leave(Context& context, std::uint64_t group, bool reached) {
+  if (!reached) stop(context, group);
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    if (has(outputs_[i], group)) end(context, i);
+  }
+}
+
+}  // namespace stepdriver::activity

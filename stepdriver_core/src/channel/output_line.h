@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::pulse {
+
+/// An output with a name that paths may switch.
+struct OutputLine {
+  int output = -1;     ///< by its index in the gpio::Lines
+  bool active = true;  ///< its level while it is on
+  Nanoseconds min_on = 0;
+  Nanoseconds min_off = 0;
+  Nanoseconds max_on = kNever;
+};
+
+/// The state of such an output, as far as paths switch it.
+struct OutputLineState {
+  std::uint64_t taken = 0;       ///< serial of the last command that was handled
+  std::uint64_t reads = 0;       ///< the oldest order whose data are still read; 0: none
+  std::uint64_t group = 0;       ///< Follow::group of the path that switches it; 0: none does
+  std::uint64_t made = 0;        ///< marks of that path that were made
+  std::uint64_t ended = 0;       ///< the group of the last path that has ended
+  std::uint64_t ended_made = 0;  ///< marks of that one that were made
+  std::uint64_t changes = 0;     ///< how often a path has switched it
+  Nanoseconds changed = 0;       ///< clock time at which the last of these writes had ended
+  Nanoseconds on_since = 0;      ///< when the last write that switched it on began
+  bool on = false;               ///< by the last of them
+  bool due = false;              ///< a mark is still to come in the motion as it is ordered
+  bool too_long = false;         ///< the last of them was by OutputLine::max_on
+  int error = 0;                 ///< errno of a write that has failed, which ended the path's part
+};
+
+}  // namespace stepdriver::pulse

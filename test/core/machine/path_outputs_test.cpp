@@ -1,0 +1,641 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
+#include "support/path_bench.h"
+#include "support/refusal.h"
+
+// Outputs that a path switches where its segments begin.
+
+namespace stepdriver {
+namespace {
+
+using axis::MoveEnd;
+using machine::OutputState;
+using motion::OutputSwitch;
+using test::Bench;
+using test::CoordinatedMove;
+using test::CoordinatedResult;
+using test::kMicrostep;
+using test::kMillisecond;
+using test::kNan;
+using test::lineTo;
+using test::PathRequest;
+using test::PathSegment;
+
+constexpr std::int64_t kSecond = 1'000 * kMillisecond;
+
+/// The position at which an axis makes its step to a count: then a mark comes with that step.
+double stepTo(std::int64_t count) { return (static_cast<double>(count) - 0.5) * kMicrostep; }
+
+class PathOutputs : public test::PathBench {
+ protected:
+  void SetUp() override {
+    options.outputs.resize(2);
+    options.outputs[0].name = "pen";
+    options.outputs[0].line = "pen.line";
+    options.outputs[1].name = "laser";
+    options.outputs[1].line = "laser.line";
+    options.outputs[1].active_level = false;
+    options.outputs[1].at_stop = false;
+    options.record_seconds = 60.0;
+    axes = {plotterAxis("x"), plotterAxis("y")};
+    begin();
+  }
+
+  void begin() {
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
+    for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
+    bench = std::make_unique<Bench>(axes, specs, false, 0.0, options);
+  }
+
+  static PathSegment with(PathSegment segment, std::vector<OutputSwitch> outputs) {
+    segment.outputs = std::move(outputs);
+    return segment;
+  }
+
+  /// Along x, with a segment that ends at each of these steps. The n-th of them begins with the
+  /// pen on if n is odd, and off if it is even; the first one leaves it.
+  static PathRequest dashes(const std::vector<std::int64_t>& counts) {
+    PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0005};
+    bool on = false;
+    for (const std::int64_t count : counts) {
+      request.segments.push_back(lineTo({stepTo(count), 0.0}));
+      if (request.segments.size() > 1) request.segments.back().outputs = {{"pen", on = !on}};
+    }
+    return request;
+  }
+
+  /// The clock times at which a line was switched on, or off.
+  std::vector<std::int64_t> switched(std::size_t output, bool on) const {
+    const config::OutputConfig& config = options.outputs[output];
+    return bench->trace->times("outputs", config.name, on == config.active_level);
+  }
+  /// Both, in their order.
+  std::vector<std::int64_t> edges(std::size_t output = 0) const {
+    std::vector<std::int64_t> all = switched(output, true);
+    const std::vector<std::int64_t> off = switched(output, false);
+    all.insert(all.end(), off.begin(), off.end());
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+  struct Step {
+    std::int64_t time_ns = 0;  ///< of the clock
+    std::int64_t count = 0;    ///< after it
+  };
+  std::vector<Step> steps(const std::string& name) const {
+    const sim::MemoryTrace& trace = *bench->trace;
+    const int step = trace.pin(name, "step");
+    const int dir = trace.pin(name, "dir");
+    bool forward = trace.levels()[static_cast<std::size_t>(dir)];
+    std::vector<Step> found;
+    std::int64_t count = 0;
+    for (const sim::MemoryTrace::Edge& edge : trace.edges()) {
+      if (edge.pin == dir) forward = edge.level;
+      if (edge.pin != step || !edge.level) continue;
+      found.push_back({edge.time_ns, count += forward ? 1 : -1});
+    }
+    return found;
+  }
+  /// The clock times of the first steps of x to these counts; -1: there is none.
+  std::vector<std::int64_t> timesOfSteps(const std::vector<std::int64_t>& counts) const {
+    const std::vector<Step> all = steps("x");
+    std::vector<std::int64_t> times;
+    for (const std::int64_t count : counts) {
+      const auto found = std::find_if(all.begin(), all.end(),
+                                      [&](const Step& step) { return step.count == count; });
+      times.push_back(found == all.end() ? -1 : found->time_ns);
+    }
+    return times;
+  }
+  std::int64_t timeOfStep(std::int64_t count) const { return timesOfSteps({count}).front(); }
+  bool isOn(std::size_t output) const {
+    const config::OutputConfig& config = options.outputs.at(output);
+    const bool on = bench->rig.outputLevel(config.line) == config.active_level;
+    EXPECT_EQ(bench->machine->ioStates().outputs.at(output).on, on) << config.name;
+    return on;
+  }
+  /// Each of these steps comes with the next change of the pen.
+  void expectWithSteps(const std::vector<std::int64_t>& counts) {
+    const std::vector<std::int64_t> times = edges();
+    const std::vector<std::int64_t> wanted = timesOfSteps(counts);
+    ASSERT_EQ(times.size(), counts.size());
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      EXPECT_LE(std::abs(times[i] - wanted[i]), 1) << "mark " << i << " at " << times[i];
+    }
+  }
+
+  machine::MachineOptions options;
+  std::vector<config::AxisConfig> axes;
+};
+
+TEST_F(PathOutputs, AreSwitchedAtTheNanosecondOfTheirPlacesWithoutAStop) {
+  const std::vector<std::int64_t> counts{100, 200, 700, 707, 1500, 1900};
+  PathRequest request = dashes(counts);
+  for (PathSegment& segment : request.segments) segment.outputs.clear();
+  finish(request);
+  const std::vector<Step> without = steps("x");
+  const std::int64_t ended = bench->clock.now();
+  begin();
+  const CoordinatedResult result = finish(dashes(counts));
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.marks_made, 5U);
+  EXPECT_EQ(result.marks_not_made, 0U);
+  EXPECT_EQ(bench->clock.now(), ended);
+  const std::vector<Step> with_marks = steps("x");
+  ASSERT_EQ(with_marks.size(), without.size());
+  for (std::size_t i = 0; i < without.size(); ++i) {
+    EXPECT_EQ(with_marks[i].time_ns, without[i].time_ns);
+  }
+  expectWithSteps({100, 200, 700, 707, 1500});
+  expectAtRest();
+}
+
+TEST_F(PathOutputs, AreSwitchedInTheMiddleOfARoundedCorner) {
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0005};
+  request.segments = {lineTo({0.01, 0.0}), with(lineTo({0.01, 0.01}), {{"pen", true}})};
+  finish(request);
+  const std::vector<std::int64_t> on = edges();
+  ASSERT_EQ(on.size(), 1U);
+  // There, both axes are as far from the corner.
+  const auto countAt = [&](const std::string& name) {
+    std::int64_t count = 0;
+    for (const Step& step : steps(name)) {
+      if (step.time_ns <= on[0]) count = step.count;
+    }
+    return count;
+  };
+  EXPECT_NEAR(static_cast<double>(800 - countAt("x")), static_cast<double>(countAt("y")), 1.0);
+  EXPECT_GT(countAt("y"), 5);
+}
+
+TEST_F(PathOutputs, AtStopsAtTheBeginAndAtTheEndTheyComeWithThePlannedTimes) {
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0};
+  request.segments = {with(lineTo({0.01, 0.0}), {{"pen", true}, {"laser", true}}),
+                      with(lineTo({0.01, 0.01}), {{"pen", false}}),
+                      with(lineTo({0.01, 0.01}), {{"laser", false}})};
+  const std::int64_t asked = bench->clock.now();
+  finish(request);
+  const auto x = steps("x");
+  const auto y = steps("y");
+  ASSERT_EQ(edges(0).size(), 2U);
+  ASSERT_EQ(edges(1).size(), 2U);
+  EXPECT_GE(edges(0)[0], asked);
+  EXPECT_EQ(edges(0)[0], edges(1)[0]);
+  EXPECT_LT(edges(0)[0], x.front().time_ns);
+  EXPECT_GT(edges(0)[1], x.back().time_ns);
+  EXPECT_LT(edges(0)[1], y.front().time_ns);
+  EXPECT_GT(edges(1)[1], y.back().time_ns);
+  EXPECT_FALSE(isOn(0));
+  EXPECT_FALSE(isOn(1));
+}
+
+TEST_F(PathOutputs, APathThatOnlySwitchesIsNoMotion) {
+  PathRequest request{{"x"}, {}, false, 0.0, 0.0};
+  request.segments = {with(lineTo({0.0}), {{"pen", true}})};
+  EXPECT_EQ(finish(request).marks_made, 1U);
+  EXPECT_TRUE(isOn(0));
+  EXPECT_TRUE(steps("x").empty());
+  bench->machine->setOutput("pen", false);
+  EXPECT_FALSE(isOn(0));
+}
+
+TEST_F(PathOutputs, HoldsAndOverridesTakeThemAlong) {
+  const std::vector<std::int64_t> counts{300, 600, 601, 1200, 1800, 2400, 2700};
+  const CoordinatedMove move = followPath(dashes(counts));
+  advance(0.1);
+  machine().setSpeedOverride(0.3);
+  advance(0.1);
+  machine().hold();
+  advance(3.0);
+  machine().resume();
+  advance(0.2);
+  machine().setSpeedOverride(1.0);
+  advance(0.05);
+  machine().hold();
+  machine().resume();
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.marks_made, 6U);
+  expectWithSteps({300, 600, 601, 1200, 1800, 2400});
+}
+
+TEST_F(PathOutputs, AStopMakesWhatItPassesAndReportsTheRest) {
+  PathRequest request = dashes({400, 600, 800, 1000, 1200, 4000, 5000});
+  request.segments[0].outputs = {{"laser", true}};
+  const CoordinatedMove move = followPath(request);
+  while (steps("x").size() < 700) advance(1e-3);
+  EXPECT_TRUE(isOn(1));
+  const std::int64_t asked = bench->clock.now();
+  machine().stop();
+  EXPECT_FALSE(isOn(1)) << "its at_stop is off";
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kStopped);
+  ASSERT_EQ(switched(1, false).size(), 1U);
+  EXPECT_LE(switched(1, false)[0] - asked, kMillisecond);
+  const auto passed = static_cast<std::int64_t>(steps("x").size());
+  ASSERT_GT(passed, 1000) << "it passes marks while it slows down";
+  ASSERT_LT(passed, 4000);
+  EXPECT_EQ(edges().size(), passed >= 1200 ? 5U : 4U);
+  EXPECT_EQ(result.marks_made, 1U + edges().size());
+  EXPECT_EQ(result.marks_not_made, 7U - result.marks_made);
+  EXPECT_NE(result.message.find("pen wasn't switched at "), std::string::npos) << result.message;
+  advance(1.0);
+  EXPECT_EQ(edges().size(), result.marks_made - 1);
+  bench->machine->setOutput("pen", false);
+  bench->machine->setOutput("laser", true);
+}
+
+TEST_F(PathOutputs, AnEmergencyStopLeavesThemSafeAndCutsOffTheRest) {
+  const CoordinatedMove move = followPath(dashes({200, 500, 1000, 1500}));
+  while (steps("x").size() < 400) advance(1e-3);
+  EXPECT_TRUE(isOn(0));
+  const std::int64_t asked = bench->clock.now();
+  machine().emergencyStop();
+  EXPECT_FALSE(isOn(0));
+  ASSERT_EQ(edges().size(), 2U);
+  EXPECT_LE(edges()[1] - asked, kMillisecond);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kEmergencyStop);
+  EXPECT_EQ(result.marks_made, 1U);
+  EXPECT_EQ(result.marks_not_made, 2U);
+  machine().recover();
+  advance(1.0);
+  EXPECT_EQ(edges().size(), 2U);
+}
+
+TEST_F(PathOutputs, AreSafeAndGivenUpIfAnEmergencyStopComesInAHold) {
+  const CoordinatedMove move = followPath(dashes({200, 2000, 3000}));
+  while (steps("x").size() < 400) advance(1e-3);
+  machine().hold();
+  advance(1.0);
+  EXPECT_TRUE(isOn(0));
+  machine().emergencyStop();
+  EXPECT_FALSE(isOn(0));
+  EXPECT_EQ(machine().wait(move).marks_not_made, 1U);
+  machine().recover();
+  bench->machine->setOutput("pen", true);
+  EXPECT_TRUE(isOn(0));
+}
+
+TEST_F(PathOutputs, AFaultOfAnAxisEndsThem) {
+  axes[0].driver = driver::driverChip("drv8825");
+  axes[0].fault = config::FaultPin{"x.fault"};
+  begin();
+  const CoordinatedMove move = followPath(dashes({200, 500, 1000}));
+  while (steps("x").size() < 300) advance(1e-3);
+  sim::RigFaults over_current;
+  over_current.chip_fault_after = 10;
+  bench->rig.setFaults("x", over_current);
+  while (!machine().result(move)) advance(1e-3);
+  const CoordinatedResult result = *machine().result(move);
+  EXPECT_EQ(result.end, MoveEnd::kFault) << result.message;
+  EXPECT_EQ(result.marks_not_made, 1U);
+  advance(0.1);
+  EXPECT_FALSE(isOn(0));
+}
+
+TEST_F(PathOutputs, AnotherCommandTakesOverAndTheRestIsNotMade) {
+  const CoordinatedMove move = followPath(dashes({200, 4000, 5000}));
+  while (steps("x").size() < 300) advance(1e-3);
+  const axis::Move next = bench->axis("x").moveTo(0.02);
+  bench->axis("x").wait(next);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.marks_made, 1U);
+  EXPECT_EQ(result.marks_not_made, 1U);
+  EXPECT_TRUE(isOn(0)) << "it has no at_stop";
+  bench->machine->setOutput("pen", false);
+}
+
+TEST_F(PathOutputs, LeadsSwitchThemEarlier) {
+  PathRequest request = dashes({1000, 3000, 5000});
+  request.leads = {{"pen", 0.02, 0.005}};
+  finish(request);
+  ASSERT_EQ(edges().size(), 2U);
+  EXPECT_NEAR(static_cast<double>(timeOfStep(1000) - edges()[0]), 20e6, 1.0);
+  EXPECT_NEAR(static_cast<double>(timeOfStep(3000) - edges()[1]), 5e6, 1.0);
+}
+
+TEST_F(PathOutputs, ALeadThatIsLongerThanTheWayBeginsWithThePath) {
+  PathRequest request = dashes({10, 3000, 5000});
+  request.leads = {{"pen", 10.0, 0.0}};
+  const std::int64_t asked = bench->clock.now();
+  finish(request);
+  ASSERT_EQ(edges().size(), 2U);
+  EXPECT_GE(edges()[0], asked);
+  EXPECT_LT(edges()[0], timeOfStep(1));
+}
+
+TEST_F(PathOutputs, WhatALineCannotMakeIsRefusedBeforeAnythingMoves) {
+  options.outputs[0].min_on_ns = 50 * kMillisecond;
+  options.outputs[0].min_off_ns = 200 * kMillisecond;
+  options.outputs[0].max_on_ns = kSecond;
+  begin();
+  // 8000 steps/s.
+  EXPECT_REFUSED(followPath(dashes({2000, 2200, 6000})),
+                 "segment 2 of the path switches the output pen off 0.025");
+  EXPECT_REFUSED(followPath(dashes({2000, 2200, 6000})), "but min_on_ms of it is 0.05 s");
+  EXPECT_REFUSED(followPath(dashes({2000, 3000, 4000, 6000})), "but min_off_ms of it is 0.2 s");
+  EXPECT_REFUSED(followPath(dashes({1000, 10000, 12000})), "but max_on_s of it is 1 s");
+  PathRequest request = dashes({1000, 3000});
+  request.segments[1].outputs[0].output = "pan";
+  EXPECT_REFUSED(followPath(request),
+                 "segment 1 of the path switches the output pan, but there are pen, laser");
+  request.segments[1].outputs = {{"pen", true}, {"pen", false}};
+  EXPECT_REFUSED(followPath(request), "segment 1 of the path switches the output pen twice");
+  request.segments[1].outputs = {{"pen", true}};
+  for (const double lead : {-1e-9, 10.1, kNan}) {
+    request.leads = {{"pen", lead, 0.0}};
+    EXPECT_REFUSED(followPath(request), "but must be 0 to 10 s");
+  }
+  request.leads = {{"pan", 0.0, 0.0}};
+  EXPECT_REFUSED(followPath(request), "a lead of the path is for the output pan, but there are");
+  advance(1.0);
+  EXPECT_TRUE(steps("x").empty());
+  EXPECT_TRUE(edges().empty());
+  request.leads.clear();
+  EXPECT_EQ(finish(request).marks_made, 1U);
+}
+
+TEST_F(PathOutputs, ThePathWaitsForTheLeastTimesOfWhatWasSwitchedBefore) {
+  options.outputs[0].min_on_ns = kSecond;
+  begin();
+  machine().setOutput("pen", true);
+  PathRequest request{{"x"}, {}, false, 0.0, 0.0};
+  request.segments = {with(lineTo({0.01}), {{"pen", false}})};
+  finish(request);
+  ASSERT_EQ(edges().size(), 2U);
+  EXPECT_EQ(edges()[1] - edges()[0], kSecond);
+  EXPECT_LT(edges()[1], steps("x").front().time_ns);
+}
+
+TEST_F(PathOutputs, MaxOnEndsInAHold) {
+  options.outputs[0].max_on_ns = kSecond;
+  begin();
+  const CoordinatedMove move = followPath(dashes({400, 3000, 4000}));
+  while (steps("x").size() < 500) advance(1e-3);
+  machine().hold();
+  advance(3.0);
+  ASSERT_EQ(edges().size(), 2U);
+  EXPECT_EQ(edges()[1] - edges()[0], kSecond);
+  const OutputState state = machine().ioStates().outputs[0];
+  EXPECT_FALSE(state.on);
+  EXPECT_NE(state.note.find("the most that max_on_s allows"), std::string::npos) << state.note;
+  machine().resume();
+  EXPECT_EQ(machine().wait(move).marks_made, 2U);
+  EXPECT_EQ(edges().size(), 2U);
+}
+
+TEST_F(PathOutputs, NothingElseSwitchesThemMeanwhile) {
+  const CoordinatedMove move = followPath(dashes({200, 4000, 6000}));
+  advance(0.1);
+  EXPECT_REFUSED(machine().setOutput("pen", false), "the output pen: a path of x, y switches it");
+  machine().setOutput("laser", true);
+  machine().wait(move);
+  machine().setOutput("pen", true);
+  EXPECT_TRUE(isOn(0));
+  EXPECT_TRUE(isOn(1));
+}
+
+TEST_F(PathOutputs, OnePathHasAnOutputAtATime) {
+  PathRequest along_x{{"x"}, {}, false, 0.0, 0.0};
+  along_x.segments = {lineTo({0.01}), with(lineTo({0.02}), {{"pen", true}})};
+  PathRequest along_y = along_x;
+  along_y.names = {"y"};
+  const CoordinatedMove first = followPath(along_x);
+  EXPECT_REFUSED(followPath(along_y), "the output pen: a path of x switches it");
+  along_y.segments[1].outputs[0].output = "laser";
+  const CoordinatedMove second = followPath(along_y);
+  EXPECT_EQ(machine().wait(first).marks_made, 1U);
+  EXPECT_EQ(machine().wait(second).marks_made, 1U);
+}
+
+TEST_F(PathOutputs, AnOutputThatCannotBeWrittenIsAFaultThatNamesIt) {
+  const CoordinatedMove move = followPath(dashes({800, 2000, 4000}));
+  while (steps("x").size() < 500) advance(1e-3);
+  bench->rig.failWrites("pen.line", 0, EIO);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kFault) << result.message;
+  EXPECT_NE(state("x").fault.find("the line pen.line of the output pen can't be written: EIO"),
+            std::string::npos)
+      << state("x").fault;
+  EXPECT_EQ(result.marks_made, 0U) << "the one that failed wasn't made";
+  EXPECT_EQ(result.marks_not_made, 2U);
+  bench->rig.clearWriteFault("pen.line");
+  machine().recover();
+  EXPECT_EQ(finish(dashes({5000, 6000, 7000})).marks_made, 2U);
+}
+
+TEST_F(PathOutputs, AppendedSegmentsContinueThem) {
+  PathRequest request = dashes({400, 800, 1200});
+  request.more_follows = true;
+  const CoordinatedMove move = followPath(request);
+  advance(0.05);
+  machine().appendPath({move.id(),
+                        {with(lineTo({stepTo(1700), 0.0}), {{"pen", true}}),
+                         with(lineTo({stepTo(2500), 0.0}), {{"pen", false}})},
+                        true});
+  awaitRest();
+  advance(0.5);
+  EXPECT_REFUSED(machine().setOutput("pen", true), "a path of x, y switches it");
+  // At the end of the path, while the axes wait.
+  machine().appendPath({move.id(), {with(lineTo({stepTo(2500), 0.0}), {{"pen", true}})}, true});
+  advance(0.1);
+  EXPECT_TRUE(isOn(0));
+  machine().appendPath({move.id(), {with(lineTo({stepTo(3500), 0.0}), {{"pen", false}})}, false});
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.marks_made, 6U);
+  ASSERT_EQ(edges().size(), 6U);
+  const std::vector<std::int64_t> times = edges();
+  const std::vector<std::int64_t> counts{400, 800, 1200, 1700};
+  const std::vector<std::int64_t> wanted = timesOfSteps(counts);
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    EXPECT_LE(std::abs(times[i] - wanted[i]), 1) << i;
+  }
+}
+
+TEST_F(PathOutputs, WithAShaperTheyComeWithTheAxis) {
+  for (config::AxisConfig& axis : axes) {
+    axis.start_speed = 0.0;
+    axis.input_shaper = {{config::ShaperType::kMzv, 42.0, 0.1}};
+  }
+  begin();
+  finish(dashes({4000, 5000, 9000}));  // both at constant speed
+  expectWithSteps({4000, 5000});
+}
+
+TEST_F(PathOutputs, WithAJerkLimitTheyComeWithTheAxis) {
+  for (config::AxisConfig& axis : axes) {
+    axis.start_speed = 0.0;
+    axis.jerk = 20.0;
+  }
+  begin();
+  finish(dashes({400, 1000, 2500, 4000, 4400}));
+  const std::vector<std::int64_t> times = edges();
+  const std::vector<std::int64_t> counts{400, 1000, 2500, 4000};
+  ASSERT_EQ(times.size(), counts.size());
+  // Its quintics are within a hundredth of a microstep of the path.
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const std::int64_t step = timeOfStep(counts[i] + 1) - timeOfStep(counts[i]);
+    EXPECT_LE(std::abs(times[i] - timeOfStep(counts[i])), step / 50 + 1) << i;
+  }
+}
+
+TEST_F(PathOutputs, WithABacklashTheyComeWithTheJoint) {
+  axes[0].backlash = 20 * kMicrostep;
+  begin();
+  // Towards max and back: on the way back, the motor is 20 microsteps ahead of the joint.
+  PathRequest request{{"x"}, {}, false, 0.05, 0.0};
+  request.segments = {lineTo({0.02}), lineTo({stepTo(801)}),
+                      with(lineTo({stepTo(401)}), {{"pen", true}}),
+                      with(lineTo({stepTo(201)}), {{"pen", false}})};
+  finish(request);
+  const std::vector<std::int64_t> times = edges();
+  ASSERT_EQ(times.size(), 2U);
+  std::vector<std::int64_t> back;
+  std::int64_t before = 0;
+  for (const Step& step : steps("x")) {
+    const bool returns = step.count < std::exchange(before, step.count);
+    if (returns && (step.count == 800 || step.count == 400)) back.push_back(step.time_ns);
+  }
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_LE(std::abs(times[0] - back[0]), 1);
+  EXPECT_LE(std::abs(times[1] - back[1]), 1);
+}
+
+TEST_F(PathOutputs, AreInTheFlightRecorder) {
+  machine().setOutput("pen", true);
+  advance(0.5);
+  machine().setOutput("pen", false);
+  finish(dashes({200, 500, 1000}));
+  machine().setOutput("pen", true);
+  const machine::Recording recording = machine().recording();
+  std::vector<std::int64_t> recorded;
+  for (const machine::Recording::Pin& pin : recording.pins) {
+    if (pin.name != "pen") continue;
+    bool level = recording.levels[static_cast<std::size_t>(pin.output)];
+    for (const machine::Recording::Edge& edge : recording.edges) {
+      if (edge.output != pin.output) continue;
+      EXPECT_NE(edge.level, level) << "at " << edge.time;
+      level = edge.level;
+      recorded.push_back(edge.time);
+    }
+  }
+  EXPECT_EQ(recorded, edges());
+}
+
+TEST_F(PathOutputs, ManyMarksCostNoTimeOfThePath) {
+  std::vector<std::int64_t> counts;
+  for (std::int64_t i = 1; i <= 4000; ++i) counts.push_back(2 * i);
+  const CoordinatedResult result = finish(dashes(counts));
+  EXPECT_EQ(result.marks_made, 3999U);
+  EXPECT_EQ(edges().size(), 3999U);
+  counts.pop_back();
+  expectWithSteps(counts);
+}
+
+// ---- random motions ----
+
+// Random places, and random holds, overrides and stops at random times. The oracle knows only the
+// path's places, what the call reported, and the rig's trace: the n-th change of a line comes with
+// the step to its n-th place, and there are as many as were reported.
+class RandomPathOutputs : public PathOutputs, public testing::WithParamInterface<int> {
+ protected:
+  double unit() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
+  std::int64_t whole(std::int64_t least, std::int64_t most) {
+    return std::uniform_int_distribution<std::int64_t>(least, most)(random_);
+  }
+  void seed(unsigned number) { random_.seed(number); }
+
+  std::mt19937 random_;
+  int marks_ = 0;
+  int exact_ = 0;
+};
+
+TEST_P(RandomPathOutputs, EachMarkComesOnceAtItsNanosecondOrIsReported) {
+  for (int run = 0; run < 40; ++run) {
+    const auto number = static_cast<unsigned>(GetParam() * 1000 + run);
+    SCOPED_TRACE(number);
+    seed(number);
+    begin();
+    std::vector<std::int64_t> counts;
+    std::int64_t count = 0;
+    const auto marks = whole(2, 40);
+    for (std::int64_t i = 0; i <= marks; ++i) {
+      counts.push_back(count += whole(1, unit() < 0.3 ? 5 : 400));
+    }
+    const CoordinatedMove move = followPath(dashes(counts));
+    bool is_safe = false;
+    const auto disturb = [&] {
+      const double what = unit();
+      if (what < 0.5) {
+        machine().setSpeedOverride(0.05 + 0.95 * unit());
+      } else if (what < 0.9) {
+        machine().hold();
+        if (unit() < 0.7) advance(0.3 * unit());
+        machine().resume();
+      } else if (what < 0.94) {
+        machine().stop();
+      } else if (what < 0.97) {
+        is_safe = true;
+        machine().emergencyStop();
+      } else {
+        bench->axis("y").stop();
+      }
+    };
+    for (int i = 0; i < 8 && !machine().result(move); ++i) {
+      advance(0.1 * unit() * unit());
+      test::refusal(disturb);
+    }
+    const CoordinatedResult result = machine().wait(move);
+    ASSERT_EQ(result.marks_made + result.marks_not_made, counts.size() - 1) << result.message;
+    if (result.end == MoveEnd::kReached) {
+      ASSERT_EQ(result.marks_not_made, 0U);
+    }
+    advance(0.2);
+    std::vector<std::int64_t> times = edges();
+    if (is_safe && result.marks_made % 2 == 1) {
+      ASSERT_EQ(times.size(), result.marks_made + 1) << "to its safe state";
+      times.pop_back();
+    }
+    ASSERT_EQ(times.size(), result.marks_made);
+    const auto passed = static_cast<std::int64_t>(steps("x").size());
+    const std::vector<std::int64_t> wanted = timesOfSteps(counts);
+    const std::vector<Step> all = steps("x");
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      // While the rate changes, the steps are within a hundredth of a microstep of the path.
+      const auto step = static_cast<std::size_t>(counts[i]);
+      const std::int64_t interval =
+          step < all.size() ? all[step].time_ns - all[step - 1].time_ns : 0;
+      ASSERT_LE(std::abs(times[i] - wanted[i]), 1 + interval / 100)
+          << "mark " << i << " at count " << counts[i];
+      ++marks_;
+      exact_ += std::abs(times[i] - wanted[i]) <= 1 ? 1 : 0;
+    }
+    if (result.marks_not_made > 0) {
+      ASSERT_LE(passed, counts[result.marks_made]) << "it was passed, and not made";
+    }
+  }
+  RecordProperty("marks", marks_);
+  RecordProperty("exact", exact_);
+  EXPECT_GT(exact_, 0.9 * marks_);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomPathOutputs, testing::Range(0, 8));
+
+}  // namespace
+}  // namespace stepdriver
