@@ -75,7 +75,8 @@ struct ChannelConfig : MotorSignals {
   /// angle by which its field is behind the plan, and then returns to it, as at the steps of a
   /// coarser mode. See PulseEngine.
   double late_steps = 0.25;
-  /// [microsteps] Of the motor at a reversal before the joint moves. It need not be a whole number.
+  /// [microsteps] The motor's way at a reversal before the joint moves. It need not be a whole
+  /// number.
   double backlash = 0.0;
 };
 

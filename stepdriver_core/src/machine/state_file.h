@@ -37,7 +37,7 @@ class StateFile {
   /// Returns when it is on the disk. @throw Error
   void save(const KeptState& state) const;
 
-  /// Of the file itself, not of its lock.
+  /// The path of the file itself, not that of its lock.
   const std::string& path() const { return path_; }
 
  private:

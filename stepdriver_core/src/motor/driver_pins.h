@@ -27,7 +27,7 @@ class DriverPins {
   /// @}
   /// Whether any of the chips has it wired.
   bool hasReset() const;
-  /// Of an axis with one motor: only such a one changes its mode.
+  /// Whether the mode pins are wired; only an axis with one motor changes its mode.
   bool hasMode() const { return lines_.mode[0] >= 0; }
 
   /// Wakes the chips and releases them from reset, starting at the safe levels. Empty if neither

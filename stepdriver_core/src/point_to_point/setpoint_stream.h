@@ -13,7 +13,7 @@ class SetpointStream {
   struct Course {
     std::int64_t came_ns = 0;    ///< motion time at which it came, smoothed
     std::int64_t period_ns = 0;  ///< the stream's period; 0: it is the first setpoint
-    double velocity = 0.0;       ///< [microsteps/s] of the position
+    double velocity = 0.0;       ///< [microsteps/s] how fast the position changes
   };
 
   /// @param position [microsteps] @param now motion time

@@ -70,7 +70,7 @@ class MotionJudge {
 
  private:
   struct Edge {
-    double place = 0.0;  // [steps] of the crossing
+    double place = 0.0;  // [steps] where the crossing is
     std::int64_t time_ns = 0;
     std::int64_t slides_ns = 0;
     std::uint64_t rests = 0;    // how often the motor may have rested by then

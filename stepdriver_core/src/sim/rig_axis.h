@@ -26,8 +26,8 @@ class RigAxis {
   /// A motor that moves the carriage of a coupled axis.
   struct Drive {
     RigAxis* axis = nullptr;    ///< whose motor it is
-    double carriage_way = 0.0;  ///< [mm|deg] of this carriage for each of the motor
-    double motor_way = 0.0;     ///< [mm|deg] of the motor for each of this carriage
+    double carriage_way = 0.0;  ///< [mm|deg] the way of this carriage for each of the motor
+    double motor_way = 0.0;     ///< [mm|deg] the way of the motor for each of this carriage
   };
   /// @param drives of its carriage, its own motor among them. They live as long as this.
   void couple(std::vector<Drive> drives);
@@ -79,7 +79,7 @@ class RigAxis {
   void mendChip();
   void settle(std::int64_t time_ns);
   void snapRotor(std::int64_t time_ns);
-  /// [electrical rad] Of a way of the rotor.
+  /// [electrical rad] The angle of a way of the rotor.
   double angleOf(double microsteps) const;
   /// The motor has current, and no brake holds it.
   bool holdsRotor() const { return energized_ && (!brake_ || brake_->isReleased()); }

@@ -97,7 +97,7 @@ struct EngineFigures {
   std::uint64_t slips = 0;      ///< times that the timeline was slid because a pulse was late
   double slipped = 0.0;         ///< [s] the sum of these delays
   double worst_lateness = 0.0;  ///< [s] the largest of a pulse
-  /// Of the pulses since the start, and of those in the last whole second of the clock [ns].
+  /// [ns] For the pulses since the start, and for those in the last whole second of the clock.
   pulse::LatenessFigures lateness;
   pulse::LatenessFigures lateness_last_second;
   std::string realtime;  ///< how the pulse thread runs, in words

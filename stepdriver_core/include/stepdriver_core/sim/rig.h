@@ -78,8 +78,8 @@ struct MotorLimits {
 struct MotorSpec {
   int pole_pairs = 50;           ///< above 0; a full step is a quarter of a pole pair
   double holding_torque = 0.30;  ///< [Nm] above 0
-  double inertia = 108e-7;       ///< [kg m^2] of rotor and load, at the motor's shaft; above 0
-  double friction = 0.0;         ///< [Nm] of bearings and load, against each turn
+  double inertia = 108e-7;  ///< [kg m^2] the rotor's and the load's, at the motor's shaft; above 0
+  double friction = 0.0;    ///< [Nm] the bearings' and the load's, against each turn
   /// Damping ratio of its small oscillations, above 0. A motor has less, from 0.05 on: with full
   /// steps it then resonates, and loses steps at some speeds.
   double damping = 0.2;
