@@ -108,11 +108,13 @@ class Knots {
       : grid_(grid), limits_(limits), resolution_(resolution), axes_(grid.axes()) {
     kept_.reserve(grid.capacity());
     kept_.resize(grid.size());
+    closest_.resize(grid.size(), 0.0);
   }
 
   /// Follows a division of the grid by PathGrid::divideEach().
   void regrid(const Division& division) {
     division.spread(kept_);
+    division.spread(closest_);
     for (std::size_t i = 0; i < division.intervals.size(); ++i) {
       for (std::size_t k = 0; k < division.parts; ++k) kept_[division.firstPartOf(i) + k] = {};
     }
@@ -314,7 +316,8 @@ class Knots {
   Trapezoid trapezoid(std::size_t interval, const Reachability& speed) const {
     constexpr double kRounding = 1.001;  // allows for the rounding of differences of times
     return trapezoidOf(grid_[interval].length, speed.square(interval), speed.square(interval + 1),
-                       speed.ramp(interval), speed.peakSquare(interval), kRounding * closest_);
+                       speed.ramp(interval), speed.peakSquare(interval),
+                       kRounding * closest_[interval]);
   }
 
   void appendStraight(std::size_t interval, const Reachability& speed, double time) {
@@ -346,13 +349,14 @@ class Knots {
   // after it, the motion is as planned.
   void append(const Knot& next) {
     const double since = knots_.empty() ? kForever : next.time - knots_.back().time;
-    if (since < closest_ && next.rests) {
+    const double closest = knots_.empty() ? 0.0 : closestBetween(knots_.size() - 1, next);
+    if (since < closest && next.rests) {
       appendRest(next);
     } else {
-      if (skips_ && since >= 2.0 * closest_ && matters(knots_.back(), seen_, next)) {
-        push(within(seen_, next, knots_.back().time + closest_));
+      if (skips_ && since >= 2.0 * closest && matters(knots_.back(), seen_, next)) {
+        push(within(seen_, next, knots_.back().time + closest));
       }
-      if (since >= closest_) {
+      if (since >= closest) {
         push(next);
       } else {
         skips_ = true;
@@ -373,9 +377,10 @@ class Knots {
       const Knot close = knots_.back();
       knots_.pop_back();
       const Knot& before = knots_.back();
-      const bool has_room = rest.time - before.time >= 2.0 * closest_;
+      const double closest = closestBetween(knots_.size() - 1, rest);
+      const bool has_room = rest.time - before.time >= 2.0 * closest;
       if (has_room && !close.skipped && matters(before, close, rest)) {
-        push(within(before, close, rest.time - closest_));
+        push(within(before, close, rest.time - closest));
         knots_.back().skipped = false;
       }
       skips_ = true;
@@ -440,28 +445,47 @@ class Knots {
     return {grid_.position(knot.place)[axis], direction[axis] * knot.speed};
   }
 
-  // Finds how close knots may be, see kMostRounding.
+  // Finds how close knots in each interval may be, see kMostRounding. An axis that stands still in
+  // it isn't rounded.
   void findClosest() {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     double duration = 0.0;
     for (const Kept& kept : kept_) duration += kept.duration;
     const double time = 6.0 * std::max(0.5e-9, 2.0 * kEpsilon * duration);
-    closest_ = time / kMostRounding;
-    double rounded = time / kMostRoundingOfFast;
+    std::vector<double> rounded(axes_, 0.0);  // [s] for each axis
     for (std::size_t j = 0; j < axes_; ++j) {
       double farthest = 0.0;
-      bool moves = false;
       for (std::size_t i = 0; i <= grid_.size(); ++i) {
         farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
-        moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
       }
-      if (!moves) continue;
-      const auto [least, most] = std::minmax(limits_[j].acceleration, limits_[j].deceleration);
-      closest_ = std::min(closest_, std::sqrt(resolution_ / most));
-      rounded =
-          std::max(rounded, std::sqrt(6.0 * 2.0 * kEpsilon * farthest / (kMostRounding * least)));
+      const double least = std::min(limits_[j].acceleration, limits_[j].deceleration);
+      rounded[j] = std::sqrt(6.0 * 2.0 * kEpsilon * farthest / (kMostRounding * least));
     }
-    closest_ = std::max(closest_, rounded);
+    for (std::size_t i = 0; i < grid_.size(); ++i) {
+      double closest = time / kMostRounding;
+      double least = time / kMostRoundingOfFast;
+      for (std::size_t j = 0; j < axes_; ++j) {
+        if (!movesIn(i, j)) continue;
+        const double most = std::max(limits_[j].acceleration, limits_[j].deceleration);
+        closest = std::min(closest, std::sqrt(resolution_ / most));
+        least = std::max(least, rounded[j]);
+      }
+      closest_[i] = std::max(closest, least);
+    }
+  }
+
+  bool movesIn(std::size_t interval, std::size_t axis) const {
+    return grid_.position(interval)[axis] != grid_.position(interval + 1)[axis] ||
+           grid_.firstAtBegin(interval)[axis] != 0.0 || grid_.firstAtEnd(interval)[axis] != 0.0;
+  }
+
+  // [s] In the intervals from a knot to one that isn't in the list yet.
+  double closestBetween(std::size_t knot, const Knot& next) const {
+    double closest = 0.0;
+    for (std::size_t i = std::min(intervalAfter(knot), next.interval); i <= next.interval; ++i) {
+      closest = std::max(closest, closest_[i]);
+    }
+    return closest;
   }
 
   const PathGrid& grid_;
@@ -471,9 +495,11 @@ class Knots {
   std::vector<Kept> kept_;  // for each interval
   std::vector<Knot> knots_;
   std::vector<Joint> inner_;  // for each axis, at some of the knots
-  double closest_ = 0.0;      // [s] the least time between knots, except between two at rest
-  bool skips_ = false;        // whether knots were left out after the last one
-  Knot seen_{};               // the last knot, even if it was left out
+  // [s] The least time between knots in each interval, except between two at rest; 0 in a first
+  // plan.
+  std::vector<double> closest_;
+  bool skips_ = false;  // whether knots were left out after the last one
+  Knot seen_{};         // the last knot, even if it was left out
 };
 
 // The factors by which limits are exceeded; 1 if they aren't.
@@ -659,10 +685,14 @@ Outcome planKnots(const Path& path, const std::vector<TimingLimits>& limits, dou
 
 PathTiming planAccelerationLimited(const Path& path, const std::vector<TimingLimits>& limits,
                                    const TimingStart& begin) {
+  PathTiming plan;
   PathGrid grid(path, begin.parameter, PathGrid::kForAcceleration);
+  if (begin.speed > 0.0 && grid.stopsAt(0)) {
+    plan.excess = std::numeric_limits<double>::infinity();
+    return plan;
+  }
   Knots knots(grid, limits, path.resolution());
   const Outcome outcome = planKnots(path, limits, begin.speed, grid, knots);
-  PathTiming plan;
   if (begin.speed > 0.0) {
     plan.excess = outcome.excess;
     // From a speed that is much too high, the motion might come to rest anywhere, and never end.

@@ -99,7 +99,8 @@ struct PathTiming {
 /// slowed down by that factor as a whole.
 ///
 /// @param limits one for each axis.
-/// @return no knots if it begins at a speed from which it needs 1 % more than a limit.
+/// @return no knots if it begins at a speed from which it needs 1 % more than a limit, or at a
+/// stop.
 /// @throw motion::TooLong if it takes Profile::kLongest or longer.
 PathTiming planAccelerationLimited(const Path& path, const std::vector<TimingLimits>& limits,
                                    const TimingStart& begin = {});

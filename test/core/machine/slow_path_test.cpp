@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stepdriver_core/machine/coordinated_move.h"
@@ -93,6 +94,44 @@ TEST(SlowPath, KeepsItsSpeedAllAlongALine) {
   for (const double jerk : {1000.0, 0.0}) {
     SCOPED_TRACE(jerk);
     expectSteadySteps(lines({{0.002, 1e-5}}), {80'000.0, 0.1, 3.0, jerk});
+  }
+}
+
+// x and y have a microstep a unit. There is no room for a rounding before the end at which the path
+// stops, so the motion can't go on from the speed that it has right before it.
+TEST(SlowPath, ThatIsContinuedNextToItsEndDoesNotPassIt) {
+  const std::vector<motion::PathAxis> axes = {pathAxis("x", {1.0, 21.5, 3.31e4, 0.0}),
+                                              pathAxis("y", {1.0, 5.62e5, 3.16e11, 0.0})};
+  const auto line_to = [](double x, double y) {
+    PathSegment segment;
+    segment.end = {x, y};
+    return segment;
+  };
+  PathRequest request{{"x", "y"}, {line_to(6.0, -2.0), line_to(432.0, 957.0)}, false, 0.0171, 10.4};
+  request.more_follows = true;
+  const PlannedPath first = planned(request, axes);
+  const PlannedPath path = test::fed(first, {line_to(1475.0, 530.0)}, 0.8 * first.duration());
+  std::int64_t count = 0;
+  std::int64_t highest = 0;
+  for (const auto& step : path.steps(1)) highest = std::max(highest, count += step.second);
+  EXPECT_EQ(highest, 957);
+  EXPECT_EQ(count, 530);
+}
+
+// While x moves fast, y rests: its low acceleration makes no difference to how the knots of x may
+// lie.
+TEST(SlowPath, BeforeAFastLineDoesNotMakeThatOneFaster) {
+  const std::vector<motion::PathAxis> axes = {pathAxis("x", {1.0, 1e6, 1e12, 0.0}),
+                                              pathAxis("y", {1.0, 1e6, 0.001, 0.0})};
+  PathRequest request{{"x", "y"}, {}, false, 17'600.0, 0.0};
+  for (const double x : {-170.0, -166.0}) {
+    request.segments.emplace_back().end = {x, 133.0};
+  }
+  const PlannedPath path = planned(request, axes);
+  const AxisSteps steps = path.steps(0);
+  ASSERT_EQ(steps.size(), 174U);
+  for (std::size_t i = 171; i < steps.size(); ++i) {
+    EXPECT_GE(static_cast<double>(steps[i].first - steps[i - 1].first) * 1e-9 * 17'600.0, 0.999);
   }
 }
 

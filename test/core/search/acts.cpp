@@ -241,7 +241,7 @@ std::vector<Act> makeActs() {
       {"a pin is slow", [](Participants& all, int) { all.hangNextPin(20'000'000); }},
       {"shut down", [](Participants& all, int client) { all.shutDown(client); }},
       inTurn("path of x and y that is held, resumed and ended", holdsAndFeeds),
-      slowPath(40e-6, 3e-6),
+      slowPath(40e-6, 1e-6),
       {"switch the tool on", [](Participants& all, int client) { all.switchTool(client, true); }},
       {"switch the tool off", [](Participants& all, int client) { all.switchTool(client, false); }},
   };

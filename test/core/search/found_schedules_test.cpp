@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "search/participants.h"
@@ -217,11 +218,13 @@ TEST(FoundSchedules, AnAxisThatIsShapedTwiceMakesNoBursts) {
   }
 }
 
-// Its ramps are so short that their ends were dropped, and the second line began with the speed of
-// the first.
+// Its ramps are so short that their ends were dropped: the second line began with the speed of the
+// first one, or, with a jerk limit, the first one with an acceleration.
 TEST(FoundSchedules, ASlowPathStaysWhereItIsSentTo) {
   for (int variant = 0; variant < 5; ++variant) {
-    expectGood({variant, {does(0, 0, "slow path of x and y at 4e-05 and 3e-06 m/s")}, {}});
+    for (const auto& [first, second] : {std::pair(40e-6, 1e-6), std::pair(3e-6, 10e-6)}) {
+      expectGood({variant, {{0, 0, 0, std::make_shared<const Act>(slowPath(first, second))}}, {}});
+    }
   }
 }
 
