@@ -135,7 +135,7 @@ double acrossOf(const std::vector<double>& jump, const PathPoint& in, double rat
 
 Path::Path(std::vector<double> start, const std::vector<CurveSegment>& segments, double resolution,
            Continuity continuity, bool continues)
-    : start_(std::move(start)), resolution_(resolution) {
+    : start_(std::move(start)), resolution_(resolution), continues_(continues) {
   segments_.reserve(segments.size());
   for (std::size_t i = 0; i < segments.size(); ++i) {
     segments_.push_back(placed(i == 0 ? start_ : segments[i - 1].end, segments[i]));
@@ -285,6 +285,7 @@ Path Path::part(std::size_t first, std::size_t last) const {
   made.segments_.assign(segments_.begin() + static_cast<std::ptrdiff_t>(first),
                         segments_.begin() + static_cast<std::ptrdiff_t>(last) + 1);
   made.open_ = {open_.segment - std::min(open_.segment, first), open_.parameter};
+  made.continues_ = continues_;
   return made;
 }
 

@@ -158,6 +158,8 @@ class Path {
     double parameter = 0.0;
   };
   Place openFrom() const { return open_; }
+  /// Whether more segments will be appended to the path of which it is all or a part.
+  bool continues() const { return continues_; }
   /// Whether the motion has to stop at the end of a segment.
   bool stopsAfter(std::size_t segment) const { return segments_[segment].stops; }
   /// [unit/s] See CurveSegment::speed.
@@ -216,6 +218,7 @@ class Path {
 
   std::vector<double> start_;
   double resolution_;
+  bool continues_;
   std::vector<Segment> segments_;
   Place open_;
 };

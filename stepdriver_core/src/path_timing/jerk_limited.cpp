@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "corner_look_ahead.h"
 #include "geometry/path_grid.h"
 #include "give_way.h"
 #include "jerk_limited_knots.h"
@@ -91,20 +92,178 @@ class JerkLimitedSection {
     return 2.0 * slowest < std::min(fastest, std::cbrt(length * length * jerk / 4.0));
   }
 
-  // Divides intervals in which quintics would deviate from the path.
   Plan fastest() {
+    return onThePath([&] { return bestOfTimes(); });
+  }
+
+  /// The motion from rest to rest along lines that passes each corner between them at a constant
+  /// speed [unit/s] above 0.
+  Plan throughCorners(const std::vector<double>& speeds) {
+    return onThePath([&] {
+      std::optional<Plan> plan = planThroughCorners(speeds);
+      return plan ? *std::move(plan) : bestOfTimes();
+    });
+  }
+
+  /// @name Of a section of lines, for cornerSpeeds()
+  /// @{
+  LineBetweenCorners lineOf(std::size_t segment) const {
+    PathPoint from;
+    PathPoint to;
+    path_.evaluateGiven(segment, 0.0, from);
+    path_.evaluateGiven(segment, 1.0, to);
+    LineBetweenCorners line;
+    std::vector<double>& way = to.position;
+    double square = 0.0;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      way[j] -= from.position[j];
+      square += way[j] * way[j];
+    }
+    line.length = std::sqrt(square);
+    line.in_first = path_.roundedUntil(segment) * line.length;
+    line.in_last = (1.0 - path_.roundedFrom(segment)) * line.length;
+    const std::vector<bool>& measured = path_.measured(segment);
+    double rate = 0.0;  // squared, of the measured axes
+    line.limits = {kUnlimited, kUnlimited, kUnlimited, kUnlimited};
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      const double part = std::abs(way[j]) / line.length;
+      if (!(part > 0.0)) continue;
+      if (measured.empty() || measured[j]) rate += part * part;
+      const TimingLimits& of = limits_[j];
+      const double ramp = std::max(of.acceleration, of.deceleration) / kShortestAverage;
+      line.limits.speed = std::min(line.limits.speed, of.speed / part);
+      line.limits.acceleration = std::min(line.limits.acceleration, of.acceleration / part);
+      line.limits.deceleration = std::min(line.limits.deceleration, of.deceleration / part);
+      line.limits.jerk = std::min(line.limits.jerk, std::min(of.jerk, ramp) / part);
+    }
+    if (rate > 0.0) {
+      line.limits.speed = std::min(line.limits.speed, path_.speed(segment) / std::sqrt(rate));
+    }
+    return line;
+  }
+
+  // The speed is lowered by what the quintics along the corner exceed at it.
+  RoundedCorner cornerAfter(std::size_t segment) const {
+    RoundedCorner corner;
+    corner.speed = kUnlimited;
+    const std::size_t begin = grid_.firstFrom({segment, path_.roundedFrom(segment)});
+    std::size_t end = begin;
+    for (; end < grid_.size() && cornerOf(end) == segment; ++end) {
+      corner.length += grid_[end].length;
+      corner.speed = std::min(corner.speed, caps_[end].value);
+    }
+    LimitUsage usage;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double v = corner.speed;
+      for (std::size_t j = 0; j < limits_.size(); ++j) {
+        usage.include(usageOf(
+            {grid_.position(i)[j], grid_.firstAtBegin(i)[j] * v, grid_.secondAtBegin(i)[j] * v * v},
+            {grid_.position(i + 1)[j], grid_.firstAtEnd(i)[j] * v, grid_.secondAtEnd(i)[j] * v * v},
+            grid_[i].length / v, limits_[j]));
+      }
+    }
+    corner.speed = corner.length > 0.0 ? corner.speed / usage.slowdown() : 0.0;
+    return corner;
+  }
+  /// @}
+
+ private:
+  static constexpr std::size_t kNoCorner = std::numeric_limits<std::size_t>::max();
+
+  // The segment at whose end is the corner to which an interval belongs.
+  std::size_t cornerOf(std::size_t interval) const {
+    const PathGrid::Interval& of = grid_[interval];
+    const double middle = (of.from + of.to) / 2.0;
+    if (middle > path_.roundedFrom(of.segment)) return of.segment;
+    return middle < path_.roundedUntil(of.segment) ? of.segment - 1 : kNoCorner;
+  }
+
+  // Divides intervals in which quintics would deviate from the path.
+  template <typename MakePlan>
+  Plan onThePath(const MakePlan& make) {
     for (int i = 0;; ++i) {
-      Plan best = bestOfTimes();
+      Plan plan = make();
       std::vector<bool> deviates(grid_.size(), false);
-      if (!best.possible() || i == kMostDivisionRounds || !findDeviations(best.knots, deviates)) {
-        return best;
+      if (!plan.possible() || i == kMostDivisionRounds || !findDeviations(plan.knots, deviates)) {
+        return plan;
       }
       grid_.divideEach(deviates, kPartsOfDivision);
       findCaps();
     }
   }
 
- private:
+  // Empty if a line is too short for the change of the speed, by rounding.
+  std::optional<Plan> planThroughCorners(const std::vector<double>& speeds) const {
+    std::vector<AveragedPart> parts;
+    AveragedPart at;
+    const auto run = [&](double duration, double jerk) {
+      at.jerk = jerk;
+      parts.push_back(at);
+      at.time += duration;
+      at.distance +=
+          duration * (at.speed + duration * (at.acceleration / 2.0 + duration * jerk / 6.0));
+      at.speed += duration * (at.acceleration + duration * jerk / 2.0);
+      at.acceleration += duration * jerk;
+    };
+    double passed = 0.0;
+    std::size_t i = 0;
+    const auto pass_intervals = [&](std::size_t corner, std::size_t segment) {
+      const double begin = passed;
+      for (; i < grid_.size() && cornerOf(i) == corner; ++i) {
+        if (corner == kNoCorner && grid_[i].segment != segment) break;
+        passed += grid_[i].length;
+      }
+      return passed - begin;
+    };
+    for (std::size_t segment = 0; segment <= speeds.size(); ++segment) {
+      const double before = segment == 0 ? 0.0 : speeds[segment - 1];
+      const double after = segment == speeds.size() ? 0.0 : speeds[segment];
+      const double line = pass_intervals(kNoCorner, segment);
+      if (line > 0.0) {
+        const auto phases = planLine(line, before, after, lineOf(segment).limits);
+        if (!phases) return std::nullopt;
+        for (const LinePhase& phase : *phases) run(phase.duration, phase.jerk);
+      } else if (before != after) {
+        return std::nullopt;
+      }
+      at.distance = passed;
+      at.speed = after;
+      at.acceleration = 0.0;
+      if (segment == speeds.size()) break;
+      run(pass_intervals(segment, segment) / after, 0.0);
+      at.distance = passed;
+    }
+    if (i < grid_.size()) return std::nullopt;
+    at.jerk = 0.0;
+    parts.push_back(at);
+    return planParts(parts);
+  }
+
+  Plan planParts(const std::vector<AveragedPart>& parts) const {
+    const double closest = closestKnots(parts, parts.back().time);
+    Plan plan{
+        makeKnots(grid_, limits_, parts, kShortestAverage, closest, path_.resolution()), {}, {}};
+    LimitUsage worst;
+    for (std::size_t i = 0; i < plan.knots.size(); ++i) {
+      plan.segments.push_back(grid_[plan.knots[i].interval].segment);
+      plan.straight.push_back(false);
+      if (i > 0) worst.include(usageBefore(plan.knots, i));
+    }
+    plan.slowdown = worst.slowdown();
+    return plan;
+  }
+
+  // Of the quintic that ends at a knot.
+  LimitUsage usageBefore(const JerkLimitedKnots& knots, std::size_t index) const {
+    LimitUsage usage;
+    const double duration = knots[index].time - knots[index - 1].time;
+    for (std::size_t j = 0; j < limits_.size(); ++j) {
+      usage.include(
+          usageOf(knots.state(index - 1, j), knots.state(index, j), duration, limits_[j]));
+    }
+    return usage;
+  }
+
   // What has been lowered because a quintic exceeded a limit.
   struct Lowered {
     std::vector<CeilingSpan> speeds;
@@ -532,11 +691,7 @@ class JerkLimitedSection {
     LimitUsage worst;
     for (std::size_t i = 1; i < knots.size(); ++i) {
       giveWayAt(i);
-      LimitUsage usage;
-      for (std::size_t j = 0; j < limits_.size(); ++j) {
-        usage.include(usageOf(knots.state(i - 1, j), knots.state(i, j),
-                              knots[i].time - knots[i - 1].time, limits_[j]));
-      }
+      const LimitUsage usage = usageBefore(knots, i);
       worst.include(usage);
       if (usage.most() < 1.0 + kNoDifference) continue;
       const double slowdown = usage.slowdown();
@@ -637,6 +792,11 @@ class StopChoice {
 
   std::vector<Run> fastest() {
     JerkLimitedSection section(path_, limits_, begin_);
+    return isOfLines() ? alongLines(section) : byAverages(section);
+  }
+
+ private:
+  std::vector<Run> byAverages(JerkLimitedSection& section) {
     std::vector<std::size_t> corners;
     for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
       if (path_.isSeparate(i) && section.mayStopAt(i)) corners.push_back(i);
@@ -647,11 +807,100 @@ class StopChoice {
     return choose(path_, std::move(whole), stoppingAt(std::move(corners)));
   }
 
- private:
+  // Whether it is a motion from rest along lines whose corners are rounded one by one, which won't
+  // be continued: the knots of cornerSpeeds() aren't begins of other paths.
+  bool isOfLines() const {
+    if (begin_.speed > 0.0 || begin_.parameter > 0.0) return false;
+    if (path_.continues()) return false;
+    for (std::size_t i = 0; i < path_.size(); ++i) {
+      if (!path_.isLine(i)) return false;
+      const bool last = i + 1 == path_.size();
+      if (!last && !(path_.isSeparate(i) && path_.blendAfter(i) > 0.0)) return false;
+    }
+    return true;
+  }
+
+  // The look-ahead chooses the stops and the speeds. Corners at which a stop can't be faster (see
+  // mayStopAt()) are better passed at a changing speed: between the stops around them, the moving
+  // average is taken if it is faster.
+  std::vector<Run> alongLines(const JerkLimitedSection& section) const {
+    std::vector<LineBetweenCorners> lines;
+    std::vector<RoundedCorner> corners;
+    std::vector<bool> gentle;
+    for (std::size_t i = 0; i < path_.size(); ++i) {
+      lines.push_back(section.lineOf(i));
+      if (i + 1 == path_.size()) break;
+      corners.push_back(section.cornerAfter(i));
+      gentle.push_back(!section.mayStopAt(i));
+    }
+    const std::vector<double> speeds = cornerSpeeds(lines, corners);
+    std::vector<std::size_t> stops;
+    for (std::size_t i = 0; i < speeds.size(); ++i) {
+      if (speeds[i] == 0.0 && !gentle[i]) stops.push_back(i);
+    }
+    const Path path = path_.withStops(stops);
+    std::vector<Run> chosen;
+    stops.push_back(path_.size() - 1);
+    std::size_t first = 0;
+    TimingStart rest = atRest(begin_.before);
+    for (const std::size_t last : stops) {
+      std::vector<Run> runs = throughCorners(path.part(first, last), rest,
+                                             {speeds.begin() + static_cast<std::ptrdiff_t>(first),
+                                              speeds.begin() + static_cast<std::ptrdiff_t>(last)});
+      const auto begin = gentle.begin() + static_cast<std::ptrdiff_t>(first);
+      if (std::find(begin, begin + static_cast<std::ptrdiff_t>(last - first), true) !=
+          begin + static_cast<std::ptrdiff_t>(last - first)) {
+        const Path part = path.part(first, last);
+        JerkLimitedSection same(part, limits_, rest);
+        std::vector<Run> averaged = StopChoice(part, limits_, rest).byAverages(same);
+        if (durationOf(averaged) < durationOf(runs)) runs = std::move(averaged);
+      }
+      rest.before += durationOf(runs);
+      for (Run& run : runs) {
+        run.first += first;
+        run.last += first;
+        chosen.push_back(std::move(run));
+      }
+      first = last + 1;
+    }
+    return chosen;
+  }
+
+  // @param speeds at the corners; 0: a stop.
+  std::vector<Run> throughCorners(const Path& path, TimingStart rest,
+                                  const std::vector<double>& speeds) const {
+    std::vector<std::size_t> stops;
+    for (std::size_t i = 0; i < speeds.size(); ++i) {
+      if (speeds[i] == 0.0) stops.push_back(i);
+    }
+    const Path stopped = path.withStops(stops);
+    stops.push_back(path.size() - 1);
+    std::vector<Run> runs;
+    std::size_t first = 0;
+    for (const std::size_t last : stops) {
+      const Path part = stopped.part(first, last);
+      runs.push_back({first, last,
+                      JerkLimitedSection(part, limits_, rest)
+                          .throughCorners({speeds.begin() + static_cast<std::ptrdiff_t>(first),
+                                           speeds.begin() + static_cast<std::ptrdiff_t>(last)})});
+      rest.before += runs.back().plan.duration();
+      first = last + 1;
+    }
+    return runs;
+  }
+
+  static double durationOf(const std::vector<Run>& runs) {
+    double duration = 0.0;
+    for (const Run& run : runs) duration += run.plan.duration();
+    return duration;
+  }
+
   Run planned(const Path& path, std::size_t first, std::size_t last) const {
     const Path part = path.part(first, last);
     const TimingStart begin = first == 0 ? begin_ : atRest(begin_.before + longest_);
-    return {first, last, JerkLimitedSection(part, limits_, begin).fastest()};
+    JerkLimitedSection section(part, limits_, begin);
+    const bool line = first == last && StopChoice(part, limits_, begin).isOfLines();
+    return {first, last, line ? section.throughCorners({}) : section.fastest()};
   }
 
   // The runs from one corner to the next. Those at which a motion that begins at a speed can't stop
@@ -679,10 +928,8 @@ class StopChoice {
   // @param path with the stops that have been chosen. @param stopping the runs from one corner
   //   to the next along the way of `whole`.
   std::vector<Run> choose(const Path& path, Run whole, std::vector<Run> stopping) const {
-    double duration = 0.0;
-    for (const Run& run : stopping) duration += run.plan.duration();
     std::vector<Run> chosen;
-    if (stopping.size() < 2 || whole.plan.duration() <= duration) {
+    if (stopping.size() < 2 || whole.plan.duration() <= durationOf(stopping)) {
       chosen.push_back(std::move(whole));
       return chosen;
     }

@@ -34,6 +34,11 @@ namespace stepdriver::motion {
 /// there, and the corner isn't rounded (PathTiming::stops): no motion takes longer than with a
 /// stop at each corner.
 ///
+/// A section from rest along lines whose corners are rounded one by one needs no average if it
+/// won't be continued: each line has the fastest motion from one speed to another, and each corner
+/// a constant speed, which a look-ahead chooses (see cornerSpeeds()). On a straight line this is
+/// the optimum.
+///
 /// If it begins at a speed v and an acceleration a, the average first contains a motion at the
 /// acceleration a which lasted for T and whose mean place, speed and acceleration are those of the
 /// begin: it ended v T/2 + a T^2/12 after the begin, at the speed v + a T/2. So the jerk may jump

@@ -183,6 +183,7 @@ using Search = EndState<double>;
 using Exact = EndState<DoubleDouble>;
 
 template DoubleDouble levelVelocity(const Exact&, const MotionLimits&);
+template void changeVelocity(Search&, double, const MotionLimits&);
 template void changeVelocity(Phases&, DoubleDouble, const MotionLimits&);
 template void turn(Search&, double, double, const MotionLimits&);
 template void turn(Exact&, double, DoubleDouble, const MotionLimits&);

@@ -650,7 +650,8 @@ TEST_F(SmoothPathQueue, OfRandomLinesKeepsLimitsAndTolerance) {
     const CoordinatedResult result = feedInTime(zigzag(60), 2, least);
     EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
     if (least == 1.0) {
-      EXPECT_LE(result.duration, 1.01 * in_one_go);
+      // In one go, lines and corners have closed forms, which are faster than averages.
+      EXPECT_LE(result.duration, 1.02 * in_one_go);
     }
     expectOnPath(zigzag(60));
     expectSmooth();

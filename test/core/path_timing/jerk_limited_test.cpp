@@ -135,10 +135,9 @@ TEST(JerkLimitedTiming, OfALineHasTheSevenPhasesOfTheFastest) {
   EXPECT_NEAR(duration(1000.0, {1000.0, 5000.0, 5000.0, 50'000.0}), 1.3, 1e-6);
   // Without the highest speed: sqrt((a/j)^2 + 4 length/a) + a/j
   EXPECT_NEAR(duration(1000.0, {1e6, 5000.0, 5000.0, 50'000.0}), std::sqrt(0.01 + 0.8) + 0.1, 1e-6);
-  // Without the highest acceleration 4 cbrt(length/(2 j)), apart from the choice of the time.
-  const double optimum = 4.0 * std::cbrt(1000.0 / (2.0 * 50'000.0));
-  EXPECT_LE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), 1.02 * optimum);
-  EXPECT_GE(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}), optimum - 1e-9);
+  // Without the highest acceleration: 4 cbrt(length/(2 j))
+  EXPECT_NEAR(duration(1000.0, {1e6, 1e6, 1e6, 50'000.0}),
+              4.0 * std::cbrt(1000.0 / (2.0 * 50'000.0)), 1e-6);
 }
 
 TEST(JerkLimitedTiming, PassesACircleOfLinesWithoutStopping) {
@@ -313,6 +312,8 @@ TEST(JerkLimitedTiming, StopsAtCornersThatItCanNotPassFaster) {
     lines.push_back(lineTo(place, 0.0));
   }
   expect_not_slower("random lines", lines, {3, limit});
+  // With stops at all corners 13.4 s; with lines and corners planned as averages 12.94 s.
+  EXPECT_LE(secondsWithTolerance({0.0, 0.0, 0.0}, lines, {3, limit}, 4.0), 12.8);
 
   const double length = 1000.0 * kMillimetre;
   CurveSegment arc;
