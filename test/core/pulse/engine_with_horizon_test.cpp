@@ -215,6 +215,25 @@ TEST_F(EngineWithHorizon, SaysThatItFollowsAProfileWhenThatIsPlayedAndNotWhenItI
   EXPECT_EQ(engine->channel(0).following, second);
 }
 
+// About fifty profiles are accepted and not yet played.
+TEST_F(EngineWithHorizon, FollowsAStreamOfProfilesAMillisecondApart) {
+  makeAhead({config(0)});
+  engine->serve();
+  constexpr int kProfiles = 200;
+  std::uint64_t before = 0;
+  for (int i = 0; i < kProfiles; ++i) {
+    const Nanoseconds start = clock.now() + kHorizon + kMillisecond;
+    before = follow(cruise(start, 10 * i, 10 * i + 1'000, 10'000.0), 0, before);
+    run(clock.now() + kMillisecond);
+    ASSERT_EQ(engine->channel(0).accepted, before) << i;
+    const auto ahead = static_cast<double>(before - engine->channel(0).following);
+    EXPECT_NEAR(ahead, std::min(i, 51), 2.0) << i;
+  }
+  run(clock.now() + 300 * kMillisecond);
+  EXPECT_EQ(engine->channel(0).count, 10 * (kProfiles - 1) + 1'000);
+  EXPECT_EQ(rises(0), 10 * (kProfiles - 1) + 1'000);
+}
+
 TEST_F(EngineWithHorizon, EndsTheAxisWhoseSwitchStopsASharedMotor) {
   ChannelConfig x = config(0);
   x.endstop_max = Signal{7, true};
