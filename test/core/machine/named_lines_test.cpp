@@ -26,9 +26,8 @@ using machine::EmergencyDisable;
 using machine::OutputState;
 using test::Bench;
 using test::kMillisecond;
+using test::kSecond;
 using test::linearAxis;
-
-constexpr std::int64_t kSecond = 1'000 * kMillisecond;
 
 config::OutputConfig output(const std::string& name) {
   config::OutputConfig config;

@@ -32,11 +32,10 @@ using test::CoordinatedResult;
 using test::kMicrostep;
 using test::kMillisecond;
 using test::kNan;
+using test::kSecond;
 using test::lineTo;
 using test::PathRequest;
 using test::PathSegment;
-
-constexpr std::int64_t kSecond = 1'000 * kMillisecond;
 
 /// The position at which an axis makes its step to a count: then a mark comes with that step.
 double stepTo(std::int64_t count) { return (static_cast<double>(count) - 0.5) * kMicrostep; }

@@ -93,7 +93,7 @@ motion::PathSegment segmentTo(double number, motion::PathSegment::Shape shape) {
 }
 
 std::vector<Call> callsOfAMachine(double number) {
-  using Shape = motion::PathSegment::Shape;
+  using SegmentShape = motion::PathSegment::Shape;
   const std::string text = std::to_string(number);
   std::vector<Call> calls = {
       {"axis " + text, [=](Bench& bench) { bench.machine->axis(text); }},
@@ -161,7 +161,8 @@ std::vector<Call> callsOfAMachine(double number) {
        [](Bench& bench) { machine::stepRates({bench.axis().config()}, pulse::Capability()); }},
       {"motor limits", [](Bench& /*bench*/) { setup::motorLimits({}, 1); }},
   };
-  for (const Shape shape : {Shape::kLine, Shape::kArcAround, Shape::kArcThrough, Shape::kBezier}) {
+  for (const SegmentShape shape : {SegmentShape::kLine, SegmentShape::kArcAround,
+                                   SegmentShape::kArcThrough, SegmentShape::kBezier}) {
     calls.push_back(
         {"followPath " + std::to_string(static_cast<int>(shape)) + " " + text, [=](Bench& bench) {
            motion::PathRequest request;
