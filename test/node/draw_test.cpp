@@ -3,10 +3,14 @@
 #include <stepdriver/AxisStates.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
+#include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/node_under_test.h"
@@ -15,6 +19,7 @@
 #include "support/says.h"
 #include "support/temporary_file.h"
 #include "support/two_axes.h"
+#include "support/vcd_reader.h"
 
 namespace stepdriver::node_test {
 namespace {
@@ -113,6 +118,77 @@ TEST_F(Draw, GoesThroughDots) {
   expectSays(picture.text(), "dots of the drawing");
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{1600, 2400}));
+}
+
+class DrawWithATool : public Draw {
+ protected:
+  DrawWithATool() {
+    node.set("outputs/tool/pin", "tool");
+    trace_ = node.traced();
+  }
+
+  /// Where the axes were [mm] when the tool was switched on and off, by the rig's trace: "10 10 to
+  /// 30 10; ...".
+  std::string drawn() {
+    node.rig();
+    const auto waves = readVcd(trace_);
+    std::string text;
+    bool on = false;
+    for (const Waveform::Edge& edge : waves.at("outputs/tool").edges) {
+      if (edge.level == std::exchange(on, edge.level)) continue;
+      if (on && !text.empty()) text += "; ";
+      if (!on) text += " to ";
+      text += placeAt(waves, "x", edge.time_ns) + " " + placeAt(waves, "y", edge.time_ns);
+    }
+    return text;
+  }
+
+ private:
+  static std::string placeAt(const std::map<std::string, Waveform>& waves, const std::string& axis,
+                             std::int64_t time_ns) {
+    const auto& turns = waves.at(axis + "/dir").edges;
+    std::size_t turn = 0;
+    std::int64_t count = 0;
+    for (const Waveform::Edge& step : waves.at(axis + "/step").edges) {
+      if (step.time_ns > time_ns) break;
+      while (turn + 1 < turns.size() && turns[turn + 1].time_ns <= step.time_ns) ++turn;
+      if (step.level) count += turns[turn].level ? 1 : -1;
+    }
+    return std::to_string(std::llround(static_cast<double>(count) / 80.0));
+  }
+
+  std::string trace_;
+};
+
+TEST_F(DrawWithATool, LiftsThePenBetweenStrokes) {
+  node.start();
+  write("10 10\n30 10\n30 25\n\n20 20\n\n0 0\n0 10\n");
+  const auto end = draw({"--pen", "tool", "--down-s", "0", "--up-s", "0.01"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_EQ(drawn(), "10 10 to 30 25; 20 20 to 20 20; 0 0 to 0 10");
+  EXPECT_EQ(draw({"--pen", "tool", "--tolerance", "0"}).code, 0);
+}
+
+TEST_F(DrawWithATool, SwitchesALaserWithoutAStop) {
+  node.start();
+  write("10 10\n30 10\n50 10\n\n70 10\n90 10\n");
+  const auto end = draw({"--laser", "tool"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_EQ(drawn(), "10 10 to 50 10; 70 10 to 90 10");
+}
+
+TEST_F(DrawWithATool, RefusesAToolThatThereIsNot) {
+  node.start();
+  write("10 10\n30 10\n\n40 40\n");
+  const auto unknown = draw({"--pen", "pencil"});
+  EXPECT_EQ(unknown.code, 1);
+  expectSays(unknown.output, "has no output pencil (tool)");
+  const auto dots = draw({"--laser", "tool"});
+  EXPECT_EQ(dots.code, 1);
+  expectSays(dots.output, "has 1 dots, but a laser needs lines");
+  EXPECT_EQ(draw({"--laser", "tool", "--pen", "tool"}).code, 64);
+  EXPECT_EQ(draw({"--pen", "tool", "--down-s", "-1"}).code, 64);
+  EXPECT_EQ(node.pulses(), 0);
 }
 
 TEST_F(Draw, ShowsJointStatesWhereThereIsNoTrace) {

@@ -3,6 +3,7 @@
 #include <stepdriver/AppendPath.h>
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/FollowPathAction.h>
+#include <stepdriver/IoStates.h>
 #include <stepdriver/PathSegment.h>
 #include <stepdriver/PlanPath.h>
 
@@ -120,6 +121,30 @@ TEST_F(PathTest, RoundsItsCornersWithinTheTolerance) {
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{3200, 3200}));
   EXPECT_EQ(report.pulses_backward, (std::vector<std::int64_t>{3200, 3200}));
+  expectNoViolation();
+}
+
+TEST_F(PathTest, SwitchesOutputsWhereItsSegmentsBegin) {
+  node.set("outputs/pen/pin", "pen");
+  node.set("outputs/pen/min_on_ms", 100.0);
+  node.start();
+  std::vector<PathSegment> segments = kSquare;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    OutputSwitch& wanted = segments[i].outputs.emplace_back();
+    wanted.name = "pen";
+    wanted.on = i % 2 == 0;
+  }
+  const auto answer = follow(segments, [](auto& request) { request.tolerance = 0.0005; });
+  EXPECT_TRUE(answer.success) << answer.message;
+  segments[1].end = {0.02, 0.00001};
+  segments[2].outputs[0].name = "pan";
+  expectSays(follow(segments).message,
+             "segment 2 of the path switches the output pan, but there are pen");
+  segments[2].outputs.clear();
+  segments[0].end = {0.0, 0.001};
+  expectSays(follow(segments).message, "but min_on_ms of it is 0.1 s");
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{1600, 1600}));
   expectNoViolation();
 }
 
@@ -342,6 +367,44 @@ TEST_F(PathActionTest, DeceleratesAlongThePathWhenItIsCancelled) {
   EXPECT_NEAR(place[0], place[1], 2.0 * kHalfStep) << "not on the first line";
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward[0], std::llround(place[0] * 80'000.0));
+  expectNoViolation();
+}
+
+PathSegment switching(PathSegment segment, const std::string& output, bool on) {
+  OutputSwitch& wanted = segment.outputs.emplace_back();
+  wanted.name = output;
+  wanted.on = on;
+  return segment;
+}
+
+TEST_F(PathActionTest, SwitchesOutputsAndCountsThoseThatACancelCutsOff) {
+  node.set("outputs/pen/pin", "pen");
+  node.set("outputs/pen/at_stop", "off");
+  start(1.0);
+  const Recorder<IoStates> states(node.full("io_states"));
+  ASSERT_TRUE(waitUntil([&] { return states.connected(); }));
+  FollowPathGoal wanted =
+      goal({line({0.05, 0.0}), switching(line({0.15, 0.0}), "pen", true),
+            switching(line({0.15, 0.15}), "pen", false), switching(line({0.0, 0.0}), "pen", true)});
+  OutputLead& lead = wanted.leads.emplace_back();
+  lead.name = "pan";
+  client->sendGoal(wanted);
+  EXPECT_EQ(client->await(), State::REJECTED);
+  client->expectEnd(FollowPathResult::REFUSED,
+                    "a lead of the path is for the output pan, but there are pen");
+  wanted.leads.clear();
+  client->sendGoal(wanted);
+  const auto is = [](bool on) {
+    return [on](const IoStates& now) { return now.output_on == std::vector<std::uint8_t>{on}; };
+  };
+  ASSERT_TRUE(states.waitForLatest(is(true)));
+  EXPECT_GE(node.pulses(), 4000);
+  client->cancelGoal();
+  EXPECT_EQ(client->await(), State::PREEMPTED);
+  client->expectEnd(FollowPathResult::STOPPED, "pen wasn't switched at 2 of its 3 places");
+  EXPECT_EQ(client->getResult()->switched, 1U);
+  EXPECT_EQ(client->getResult()->not_switched, 2U);
+  EXPECT_TRUE(states.waitForLatest(is(false)));
   expectNoViolation();
 }
 

@@ -55,6 +55,9 @@ motion::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
   if (fields.tolerance != 0.0) {
     segment.tolerance = fields.tolerance < 0.0 ? 0.0 : fields.tolerance;
   }
+  for (const OutputSwitch& output : fields.outputs) {
+    segment.outputs.push_back({output.name, output.on != 0});
+  }
   return segment;
 }
 
@@ -71,6 +74,13 @@ std::vector<motion::PathSegment> pathSegments(const std::vector<PathSegment>& fi
     segments.push_back(segmentOf(fields[i], i));
   }
   return segments;
+}
+
+std::vector<motion::OutputLead> outputLeads(const std::vector<OutputLead>& fields) {
+  std::vector<motion::OutputLead> leads;
+  leads.reserve(fields.size());
+  for (const OutputLead& lead : fields) leads.push_back({lead.name, lead.on, lead.off});
+  return leads;
 }
 
 }  // namespace stepdriver::ros_node

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <stepdriver/OutputLead.h>
 #include <stepdriver/PathSegment.h>
 
 #include <vector>
@@ -11,6 +12,8 @@ namespace stepdriver::ros_node {
 /// @throw Refused if there are too many segments, if one has no known shape, or an arc no plane or
 ///   point.
 std::vector<motion::PathSegment> pathSegments(const std::vector<PathSegment>& fields);
+
+std::vector<motion::OutputLead> outputLeads(const std::vector<OutputLead>& fields);
 
 /// A path to which nothing is appended.
 ///
@@ -24,6 +27,7 @@ motion::PathRequest wholePath(const Fields& fields) {
   path.relative = fields.relative != 0;
   path.velocity = fields.velocity;
   path.tolerance = fields.tolerance;
+  path.leads = outputLeads(fields.leads);
   return path;
 }
 

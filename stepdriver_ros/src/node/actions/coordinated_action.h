@@ -64,6 +64,8 @@ class CoordinatedAction : public MotionAction<Action, FollowingTogether<Action>>
   virtual double progressOfGoal(const Following& following, const States& states) const = 0;
   /// Adds the fields that only this action has.
   virtual void complete(const Following& /*following*/, Feedback& /*feedback*/) const {}
+  virtual void completeResult(const machine::CoordinatedResult& /*ended*/,
+                              Result& /*result*/) const {}
 
   Following begin(const GoalHandle& handle) override {
     Following following;
@@ -102,6 +104,7 @@ class CoordinatedAction : public MotionAction<Action, FollowingTogether<Action>>
     result.message = ended->message;
     result.position = ended->positions;
     result.duration = ended->duration;
+    completeResult(*ended, result);
     reportEnd(following.handle, result, following.preempted_by);
     return true;
   }

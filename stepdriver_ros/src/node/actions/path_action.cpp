@@ -42,4 +42,10 @@ void PathAction::complete(const Following& following, FollowPathFeedback& feedba
   }
 }
 
+void PathAction::completeResult(const machine::CoordinatedResult& ended,
+                                FollowPathResult& result) const {
+  result.switched = static_cast<std::uint32_t>(ended.marks_made);
+  result.not_switched = static_cast<std::uint32_t>(ended.marks_not_made);
+}
+
 }  // namespace stepdriver::ros_node

@@ -21,6 +21,8 @@ class PathAction : public CoordinatedAction<FollowPathAction> {
   /// The progress follows the planned time, because a path may pass the same place several times.
   double progressOfGoal(const Following& following, const States& states) const override;
   void complete(const Following& following, FollowPathFeedback& feedback) const override;
+  void completeResult(const machine::CoordinatedResult& ended,
+                      FollowPathResult& result) const override;
 };
 
 }  // namespace stepdriver::ros_node
