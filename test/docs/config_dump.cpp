@@ -35,6 +35,10 @@ class Dump {
   void add(const config::BrakeConfig& brake) {
     all(brake.line, brake.release_level, brake.release_ns, brake.engage_ns);
   }
+  void add(const config::TmcConfig& tmc) {
+    all(tmc.port, tmc.baud, tmc.address, tmc.sense_resistor, tmc.run_current, tmc.hold_current,
+        tmc.hold_delay, static_cast<int>(tmc.mode), tmc.interpolate);
+  }
   void add(const config::HomingConfig& homing) {
     all(homing.at_max, homing.seek_speed, homing.latch_speed, homing.pull_off, homing.offset,
         homing.max_travel, homing.timeout, homing.debounce, homing.order);
@@ -60,7 +64,7 @@ class Dump {
   }
   void add(const config::MotorConfig& motor) {
     all(motor.motor, motor.driver, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,
-        motor.in_position, motor.offset);
+        motor.in_position, motor.offset, motor.tmc);
   }
   void add(const config::Kinematics& kinematics) {
     for (const std::string& name : kinematics.axes) add(name);

@@ -175,6 +175,24 @@ axes:
                       "base")};
 }
 
+/// An axis whose chip is on a UART.
+Node uartChip() {
+  return {"uart_chip", false, readNode,
+          yaml::parse(R"(
+gpio: {backend: simulated}
+axes:
+  x:
+    driver: tmc2209
+    pins: {step: A, dir: B}
+    tmc: {port: /dev/serial0, address: 0, sense_resistor_mohm: 110.0, run_current_a: 0.8}
+    microsteps: 16
+    steps_per_mm: 80.0
+    max_speed_mm_s: 100.0
+    acceleration_mm_s2: 500.0
+)",
+                      "base")};
+}
+
 ConfigValue scaledByRounds(const Node& node) {
   const ConfigValue steps(200);
   const ConfigValue travel(40.0);
@@ -217,6 +235,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   }
   if (std::string(node.name) == "base") return parametersUnder("The base's node", "");
   if (std::string(node.name) == "gantry") return parametersUnder("Several motors", "axes/x/");
+  if (std::string(node.name) == "uart_chip") return parametersUnder("A chip on a UART", "axes/x/");
   if (std::string(node.name) == "corexy") return parametersUnder("Axes that share motors", "");
   std::vector<Parameter> all = parametersUnder("The node", "");
   for (const Parameter& parameter : parametersUnder("Outputs and inputs with a name", "")) {
@@ -324,6 +343,7 @@ TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
     // Its other maps are those of every axis.
     if (GetParam().name == std::string("gantry") && map != "axes/x/motors/left") continue;
     if (GetParam().name == std::string("corexy") && map != "kinematics") continue;
+    if (GetParam().name == std::string("uart_chip") && map != "axes/x/tmc") continue;
     std::set<std::string> expected = on_page;
     // An axis can be of either kind, and the message about keys of both kinds says so.
     const bool is_of_any_kind = map == "axes/x" || map == "axes/x/motors/left";
@@ -382,14 +402,16 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
     EXPECT_EQ(given.config, without.config) << parameter.key << ": " << parameter.fallback;
     ++compared;
   }
-  EXPECT_GT(compared, GetParam().name == std::string("corexy") ? -1 : 5);
+  const bool has_few =
+      GetParam().name == std::string("corexy") || GetParam().name == std::string("uart_chip");
+  EXPECT_GT(compared, has_few ? -1 : 5);
 }
 
 std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param.name; }
 
 INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
                          testing::Values(driver(false), driver(true), gantry(), corexy(),
-                                         joystickNode(), baseNode()),
+                                         uartChip(), joystickNode(), baseNode()),
                          nameOf);
 
 }  // namespace

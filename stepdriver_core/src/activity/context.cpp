@@ -24,6 +24,19 @@ std::shared_ptr<std::vector<pulse::FollowMarks>> Context::marksOf(
   return found->marks;
 }
 
+std::vector<int> Context::addressesOn(const std::string& port) const {
+  std::vector<int> addresses;
+  for (const auto& axis : axes) {
+    for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
+      const motor::TmcChip* chip = axis->motor.tmcAt(i);
+      if (chip != nullptr && chip->config().port == port) {
+        addresses.push_back(chip->config().address);
+      }
+    }
+  }
+  return addresses;
+}
+
 void Context::endTurn() {
   for (const FollowCommand& command : follow_commands_) {
     pulse::Command& posted = out->commands[command.index];

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "axis/axis_model.h"
+#include "bus/register_job.h"
 #include "call.h"
 #include "motor_power.h"
 #include "path_outputs.h"
@@ -36,6 +37,7 @@ struct PinDone {
 struct Outputs {
   std::vector<pulse::Command> commands;
   std::vector<PinJob> pin_jobs;
+  std::vector<bus::RegisterJob> register_jobs;  ///< for the threads of the serial ports
   std::vector<std::pair<CallId, Reply>> answers;
   std::uint64_t clear_stops = 0;  ///< emergency stops up to this count are cleared
   bool stops = false;             ///< an emergency stop, because the motor power is lost
@@ -65,6 +67,7 @@ class Context : public AnswerSink {
   pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
   std::uint64_t stops_asked = 0;   ///< emergency stops
   std::optional<PinDone> pin_done;
+  std::optional<bus::RegisterDone> register_done;
   Outputs* out = nullptr;
   /// @}
   /// Emergency stops that were handled, and those of them that were cleared.
@@ -76,6 +79,8 @@ class Context : public AnswerSink {
   bool hasUnknownStop() const { return stops_asked != std::max(stops_handled, stops_ramping); }
 
   pulse::Nanoseconds motionNow() const { return now - slipped; }
+  /// The addresses of all chips on a serial port.
+  std::vector<int> addressesOn(const std::string& port) const;
   std::uint64_t newGroup() { return ++groups_; }
   std::uint64_t newMove() { return ++moves_; }
   std::uint64_t newJob() { return ++jobs_; }

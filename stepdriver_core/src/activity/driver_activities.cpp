@@ -19,6 +19,16 @@ std::unique_ptr<Step> resetStep(Context& context, axis::AxisModel& axis) {
   return pinsStep(context, axis, axis.motor.pins().reset(), [&axis] { axis.noteReset(); });
 }
 
+/// Writes registers of the chips that have a serial port, if there are any.
+void addSetUp(Context& context, axis::AxisModel& axis, Steps& steps, SetUpChipsStep::Which which,
+              SetUpChipsStep::Failed failed) {
+  for (std::size_t i = 0; i < axis.motor.chips(); ++i) {
+    if (axis.motor.tmcAt(i) == nullptr) continue;
+    steps.push_back(std::make_unique<SetUpChipsStep>(context, axis, which, std::move(failed)));
+    return;
+  }
+}
+
 /// Energizes the motor, or switches its current off, until the next such command.
 std::unique_ptr<Step> powerStep(Context& context, axis::AxisModel& axis, bool on) {
   return enableStep(context, axis, on, [&axis, on] { axis.motor.power().setEnabled(on); });
@@ -47,6 +57,18 @@ Steps BringUp::plan() {
   if (const auto sequence = axis.motor.pins().bringUp(); sequence.size > 0) {
     add(steps, pinsStep(context(), axis, sequence));
   }
+  // Without power they don't answer: they are set up when it comes. A chip that isn't ready is a
+  // fault of its axis, and the others can move.
+  add(steps, std::make_unique<RunStep>([this, &axis] {
+        if (!context().mode.powered) return;
+        Steps registers;
+        addSetUp(context(), axis, registers, SetUpChipsStep::Which::kAll,
+                 [&axis](const std::string& fault, const std::string& remedy) {
+                   axis.fault.latch(fault, remedy);
+                   axis.distrust();
+                 });
+        if (!registers.empty()) insert(std::move(registers));
+      }));
   add(steps, std::make_unique<RunStep>([this, &axis, enables] {
         if (!enables || axis.fault) return;
         if (context().stops_asked != context().stops_handled) return;
@@ -63,6 +85,10 @@ Steps Enable::plan() {
   Steps steps = wakeSteps(context(), axis);
   if (!axis.motor.power().wantsEnabled()) {
     append(steps, powerSteps(context(), axis));
+    addSetUp(context(), axis, steps, SetUpChipsStep::Which::kNotSetUp,
+             [&axis](const std::string& fault, const std::string& remedy) {
+               axis.refuse(fault + "; " + remedy);
+             });
     Steps enabling;
     add(enabling, powerStep(context(), axis, true));
     append(steps, braked(context(), axis, std::move(enabling)));
@@ -147,9 +173,23 @@ Steps Recover::plan() {
     }
     add(steps, std::make_unique<RunStep>([&axis] { axis.motor.pinsRestored(); }));
   }
+  add(steps, std::make_unique<RunStep>([this] { insert(setUpChips()); }));
   add(steps, std::make_unique<RunStep>([this] { insert(endFaultsOfDrivers()); }));
   add(steps, std::make_unique<RunStep>([this] { clearFault(); }));
   return braked(context(), axis, std::move(steps));
+}
+
+Steps Recover::setUpChips() {
+  axis::AxisModel& axis = *axes().front();
+  Steps steps;
+  if (!context().mode.powered) return steps;
+  // A chip without a fault keeps its current: the motor may hold a load.
+  addSetUp(context(), axis, steps, SetUpChipsStep::Which::kFaulty,
+           [&axis](const std::string& fault, const std::string& remedy) {
+             axis.fault.latch(fault, remedy);
+             axis.refuse("at fault: " + fault + "; " + remedy);
+           });
+  return steps;
 }
 
 std::optional<std::size_t> Recover::faultyFrom(std::size_t motor) const {
@@ -280,7 +320,12 @@ PinsStep::Writes ChangeMicrosteps::writes() {
               static_cast<double>(change.count) / axis.stepsPerUnit(wanted_);
   }
   PinsStep::Writes writes;
-  writes.sequence = axis.motor.pins().mode(axis.motor.microsteps(), wanted_);
+  if (motor::TmcChip* chip = axis.motor.tmcAt(0)) {
+    writes.registers = chip->changeMode(wanted_);
+    writes.take = [chip](const bus::RegisterDone& done) { return chip->takeMode(done); };
+  } else {
+    writes.sequence = axis.motor.pins().mode(axis.motor.microsteps(), wanted_);
+  }
   writes.scale = pulse::Command::Scale{change.count, axis.takenUpIn(wanted_, axis.takenUp()),
                                        axis.exactBacklash(wanted_)};
   writes.then = [&axis, change, origin] {

@@ -122,6 +122,7 @@ class Recover : public PinScript {
   Steps plan() override;
 
  private:
+  Steps setUpChips();
   Steps endFaultsOfDrivers();
   Steps switchOffAndOn(std::size_t faulty);
   std::string whyItStays(std::size_t faulty) const;

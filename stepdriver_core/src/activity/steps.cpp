@@ -55,9 +55,22 @@ bool PinsStep::poll() {
     due_ = context_.now + written.then_wait;
     phase_ = Phase::kWaiting;
   }
+  if (phase_ == Phase::kAccessing) {
+    if (!context_.register_done || context_.register_done->id != job_) return false;
+    const std::string why = writes_.take(*context_.register_done);
+    axis_.motor.noteChips();
+    if (!why.empty()) failRegisters(why);
+    writes_.registers.reset();
+    due_ = context_.now + axis_.config.timing().mode_setup_ns;
+    phase_ = Phase::kWaiting;
+  }
   if (phase_ == Phase::kWaiting) {
     if (next_ < writes_.sequence.size) {
       writeNext();
+      return false;
+    }
+    if (writes_.registers) {
+      beginRegisters();
       return false;
     }
     post(pulse::Command::Kind::kRelease);
@@ -76,6 +89,25 @@ void PinsStep::writeNext() {
   job_ = context_.newJob();
   context_.out->pin_jobs.push_back({job_, write.line, write.level});
   phase_ = Phase::kWriting;
+}
+
+void PinsStep::beginRegisters() {
+  if (context_.now < due_) return;
+  job_ = context_.newJob();
+  writes_.registers->id = job_;
+  context_.out->register_jobs.push_back(*writes_.registers);
+  phase_ = Phase::kAccessing;
+}
+
+void PinsStep::failRegisters(const std::string& why) {
+  const std::string text = axis_.chipText(0) + " " + why;
+  axis_.fault.latch(text, axis_.motor.tmcAt(0)->remedy());
+  axis_.distrust();
+  axis_.rest_since = context_.now;
+  writes_.scale.reset();
+  due_ = context_.now;
+  post(pulse::Command::Kind::kRelease);
+  throw GpioError(axis_.name() + ": " + text);
 }
 
 void PinsStep::fail(int error) {
@@ -117,6 +149,54 @@ std::unique_ptr<Step> enableStep(Context& context, axis::AxisModel& axis, bool o
     writes.failed = [&axis, on] { axis.motor.noteEnable(!on); };
     return writes;
   });
+}
+
+// ---- registers ----
+
+void SetUpChipsStep::begin() {
+  for (std::size_t i = 0; i < axis_.motor.chips(); ++i) {
+    const motor::TmcChip* chip = axis_.motor.tmcAt(i);
+    if (chip == nullptr) continue;
+    const bool is_ready = which_ != Which::kAll && chip->isSetUp();
+    if (!is_ready || which_ == Which::kFaulty) post({i, is_ready});
+  }
+}
+
+void SetUpChipsStep::post(const Open& open) {
+  motor::TmcChip& chip = *axis_.motor.tmcAt(open.motor);
+  bus::RegisterJob job =
+      open.asks ? chip.poll()
+                : chip.setUp(axis_.motor.microsteps(), context_.addressesOn(chip.config().port));
+  job.id = context_.newJob();
+  open_[job.id] = open;
+  if (!open.asks) chip.forget();
+  context_.out->register_jobs.push_back(std::move(job));
+}
+
+bool SetUpChipsStep::poll() {
+  const auto& done = context_.register_done;
+  if (const auto found = done ? open_.find(done->id) : open_.end(); found != open_.end()) {
+    const Open open = found->second;
+    open_.erase(found);
+    take(open, *done);
+  }
+  if (!open_.empty()) return false;
+  if (!fault_.empty()) failed_(fault_, remedy_);
+  return true;
+}
+
+void SetUpChipsStep::take(const Open& open, const bus::RegisterDone& done) {
+  motor::TmcChip& chip = *axis_.motor.tmcAt(open.motor);
+  const std::string why = open.asks ? chip.takePoll(done) : chip.takeSetUp(done);
+  axis_.motor.noteChips();
+  if (open.asks) {
+    if (!why.empty()) post({open.motor, false});
+  } else if (why.empty()) {
+    axis_.motor.alignTranslator(open.motor);
+  } else if (fault_.empty()) {
+    fault_ = axis_.chipText(open.motor) + " " + why;
+    remedy_ = chip.remedy();
+  }
 }
 
 Steps wakeSteps(Context& context, axis::AxisModel& axis) {

@@ -2,8 +2,10 @@
 
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "context.h"
@@ -53,6 +55,10 @@ class PinsStep : public Step {
     motor::PinSequence sequence;
     /// The position of the motor afterwards, in a new mode.
     std::optional<pulse::Command::Scale> scale;
+    /// The registers of its chip, after the pins.
+    std::optional<bus::RegisterJob> registers;
+    /// Takes the answers to them. @return why they failed; empty: they are right.
+    std::function<std::string(const bus::RegisterDone&)> take;
     std::function<void()> then;    ///< called when everything is written
     std::function<void()> failed;  ///< called if a line could not be written
   };
@@ -67,13 +73,15 @@ class PinsStep : public Step {
   }
 
  private:
-  enum class Phase { kAwaitingRest, kReserving, kWaiting, kWriting, kReleasing };
+  enum class Phase { kAwaitingRest, kReserving, kWaiting, kWriting, kAccessing, kReleasing };
 
   bool sharersMove() const;
 
   void post(pulse::Command::Kind kind);
   void writeNext();
+  void beginRegisters();
   void fail(int error);
+  void failRegisters(const std::string& why);
 
   Context& context_;
   axis::AxisModel& axis_;
@@ -84,6 +92,40 @@ class PinsStep : public Step {
   std::uint64_t serial_ = 0;
   std::uint64_t job_ = 0;
   pulse::Nanoseconds due_ = 0;
+};
+
+/// Writes all registers of the chips of an axis that have a serial port, each verified, and learns
+/// the place of each chip in the electrical cycle. The outputs of a chip are off meanwhile.
+class SetUpChipsStep : public Step {
+ public:
+  enum class Which {
+    kAll,
+    kNotSetUp,  ///< those that haven't got theirs
+    kFaulty,    ///< the same, and those that report a fault when they are asked
+  };
+  /// @param failed called at the end if a chip isn't ready, with its fault and its remedy.
+  using Failed = std::function<void(const std::string& fault, const std::string& remedy)>;
+  SetUpChipsStep(Context& context, axis::AxisModel& axis, Which which, Failed failed)
+      : context_(context), axis_(axis), which_(which), failed_(std::move(failed)) {}
+
+  void begin() override;
+  bool poll() override;
+
+ private:
+  struct Open {
+    std::size_t motor = 0;
+    bool asks = false;  // whether the chip has a fault; otherwise it is set up
+  };
+  void post(const Open& open);
+  void take(const Open& open, const bus::RegisterDone& done);
+
+  Context& context_;
+  axis::AxisModel& axis_;
+  const Which which_;
+  const Failed failed_;
+  std::map<std::uint64_t, Open> open_;  // by job
+  std::string fault_;
+  std::string remedy_;
 };
 
 /// What the two steps below have in common.

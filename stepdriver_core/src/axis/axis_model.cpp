@@ -247,8 +247,10 @@ void AxisModel::refuseMicrosteps(int wanted) const {
                     config.motors(), motor.microsteps()));
   }
   const driver::DriverChip& chip = config.driver;  // the chip of the only motor
-  const std::vector<int> known = driver::selectableMicrosteps(chip);
-  if (chip.modes.empty()) {
+  const bool by_registers = config.tmc.has_value();
+  const std::vector<int> known =
+      by_registers ? chip.microsteps : driver::selectableMicrosteps(chip);
+  if (known.empty()) {
     refuse(
         fmt::format("it can't change to {} microsteps: those of the {} are set by its DIP switches "
                     "while its power is off, and configured as `microsteps`, here {}",
@@ -258,7 +260,7 @@ void AxisModel::refuseMicrosteps(int wanted) const {
     refuse(fmt::format("the {} has no 1/{} mode; it has {}", chip.title, wanted,
                        fmt::join(known, ", ")));
   }
-  if (!motor.pins().hasMode()) {
+  if (!by_registers && !motor.pins().hasMode()) {
     refuse(
         fmt::format("it can't change to {} microsteps: the microstep pins aren't configured, so "
                     "that the board decides, here {}",
@@ -436,6 +438,7 @@ void AxisModel::noteReset() {
 }
 
 void AxisModel::noteSupplyLost() {
+  motor.forgetRegisters();
   for (std::size_t i = 0; i < config.motors(); ++i) noteHome(i);
 }
 

@@ -28,7 +28,8 @@ bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 /// All motors have the same mode: one that each driver has.
 std::optional<int> readMicrosteps(ConfigReader& axis, const std::vector<MotorChip>& chips) {
   std::optional<std::vector<int>> modes;
-  for (const auto& [chip, key] : chips) {
+  for (const MotorChip& motor : chips) {
+    const auto& chip = motor.chip;
     if (!chip || chip->microsteps.empty()) continue;
     if (!modes) modes = chip->microsteps;
     const auto is_missing = [&own = chip->microsteps](int mode) {
@@ -81,7 +82,7 @@ class AxesReader {
     config.name = name;
     checkAxisName(name, axis);
     const std::size_t issues_of_chip = issues_.size();
-    const std::vector<MotorChip> chips = readMotorChips(axis, own_);
+    const std::vector<MotorChip> chips = readMotorChips(axis, own_, ports_);
     const bool chips_are_right = issues_.size() == issues_of_chip;
     MotionContext context;
     context.microsteps = readMicrosteps(axis, chips);
@@ -133,6 +134,7 @@ class AxesReader {
   const std::vector<ConfigIssue>& issues_;
   UsedLines& used_;
   const OwnChips& own_;
+  UsedPorts ports_;
   std::map<std::string, std::string> joints_;  ///< joint -> full name of its axis
 };
 

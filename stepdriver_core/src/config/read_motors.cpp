@@ -21,9 +21,10 @@ namespace stepdriver::config {
 namespace {
 
 /// The keys that a motor has of its own if there are several.
-constexpr std::array<const char*, 8> kMotorKeys = {
-    "pins",       "invert",           "common_anode",           "fault_bias",
-    "fault_stop", "in_position_bias", "in_position_timeout_ms", "endstops"};
+constexpr std::array<const char*, 9> kMotorKeys = {
+    "pins",       "tmc",        "invert",           "common_anode",
+    "fault_bias", "fault_stop", "in_position_bias", "in_position_timeout_ms",
+    "endstops"};
 
 /// The keys of a driver: of the axis's, or of a motor's own.
 constexpr std::array<const char*, 3> kChipKeys = {"driver", "chip", "timing"};
@@ -162,11 +163,19 @@ class SquaringReader {
 
 const char* offsetKey(Kind kind) { return kind == Kind::kLinear ? "offset_mm" : "offset_deg"; }
 
-std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own) {
+std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own, UsedPorts& ports) {
+  const auto made = [&ports](ConfigReader& motor, std::optional<driver::DriverChip> chip,
+                             std::string key) {
+    MotorChip read{std::move(chip), std::move(key), {}};
+    read.tmc = readTmc(motor, read.chip, ports);
+    return read;
+  };
   axis.allow("motors");
   const ConfigValue value = axis.value("motors");
   const auto* const map = value.as<ConfigValue::Map>();
-  if (map == nullptr || map->empty()) return {{readChip(axis, pinsGiven(axis), own), ""}};
+  if (map == nullptr || map->empty()) {
+    return {made(axis, readChip(axis, pinsGiven(axis), own), "")};
+  }
   ConfigReader motors = axis.map("motors");
   std::vector<MotorChip> chips;
   std::set<std::string> pins_without_own;
@@ -196,9 +205,9 @@ std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own) {
   for (const std::string& name : motors.keys()) {
     ConfigReader motor = motors.map(name);
     if (motor.has("driver")) {
-      chips.push_back({readChip(motor, pinsGiven(motor), own), "motors/" + name + "/"});
+      chips.push_back(made(motor, readChip(motor, pinsGiven(motor), own), "motors/" + name + "/"));
     } else {
-      chips.push_back({common, ""});
+      chips.push_back(made(motor, common, ""));
     }
   }
   return chips;
@@ -209,6 +218,8 @@ void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisCon
   const auto read = [&](ConfigReader& reader, std::size_t number, MotorConfig& motor) {
     const auto& chip = chips.at(number).chip;
     if (chip) motor.driver = *chip;
+    motor.tmc = chips.at(number).tmc;
+    reader.allow("tmc");
     readPins(reader, chip ? &*chip : nullptr, motor, used);
     readEndstops(reader, motor, used);
   };

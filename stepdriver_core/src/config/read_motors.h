@@ -6,6 +6,7 @@
 
 #include "config/used_lines.h"
 #include "read_chip.h"
+#include "read_tmc.h"
 #include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
@@ -17,12 +18,13 @@ struct MotorChip {
   /// The prefix of its `driver`, `chip` and `timing` in the keys of the axis: "motors/left/", or
   /// empty if they are the axis's.
   std::string key;
+  std::optional<TmcConfig> tmc;  ///< of this motor's chip
 };
 
 /// Reads the drivers of the motors of an axis: of each its own, or that of the axis.
 ///
 /// @return one for each of `motors`, in their order; one if there is no such map.
-std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own);
+std::vector<MotorChip> readMotorChips(ConfigReader& axis, const OwnChips& own, UsedPorts& ports);
 
 /// The key of a motor's MotorConfig::offset.
 const char* offsetKey(Kind kind);

@@ -79,10 +79,11 @@ Bias readBias(ConfigReader& reader, const std::string& key) {
 }
 
 /// Why the chip has no such pin; empty if it has one.
-std::string whyMissing(const driver::DriverChip& chip, const PinName& name) {
+std::string whyMissing(const driver::DriverChip& chip, const PinName& name, bool by_registers) {
   const std::string without = "the " + chip.title + " has no ";
   if (isMicrostepPin(name) && chip.modes.empty()) {
-    return without + "microstep pins: its microsteps are set by switches";
+    return without + (by_registers ? "microstep pins with `tmc`: MS1 and MS2 are its address"
+                                   : "microstep pins: its microsteps are set by switches");
   }
   if (name.pin == &Pins::ms2 && chip.mode_pins < 2) return without + "second microstep pin";
   if (name.pin == &Pins::ms3 && chip.mode_pins < 3) return without + "third microstep pin";
@@ -150,7 +151,7 @@ class PinsReader {
     }
     if (isPulsePin(name)) refuseOtherPulsePin(name);
     if (chip_ != nullptr) {
-      const std::string why = whyMissing(*chip_, name);
+      const std::string why = whyMissing(*chip_, name, axis_.has("tmc"));
       if (!why.empty()) return refuse(name, why);
     }
     const bool alias = name.from_0_key != nullptr && reader_.has(name.from_0_key);

@@ -13,6 +13,7 @@
 #include "read_motors.h"
 #include "read_pins.h"
 #include "read_shaper.h"
+#include "read_tmc.h"
 
 namespace stepdriver::config {
 namespace {
@@ -74,6 +75,7 @@ class AxisWriter {
     map["driver"] = driver;
     map["chip"] = writeChip(motor.driver);
     map["timing"] = writtenTiming(motor.driver.timing);
+    if (motor.tmc) map["tmc"] = writeTmc(*motor.tmc);
     writePins(motor, map);
     ConfigValue::Map endstops;
     if (motor.endstop_min) endstops["min"] = writeSwitch(*motor.endstop_min);

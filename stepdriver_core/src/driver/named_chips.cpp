@@ -150,6 +150,14 @@ DriverChip tmc2209() {
   return chip;
 }
 
+/// A TMC2209 in a larger case, with the same pins and registers (TMC2226 datasheet).
+DriverChip tmc2226() {
+  DriverChip chip = tmc2209();
+  chip.name = "tmc2226";
+  chip.title = "TMC2226";
+  return chip;
+}
+
 /// The chip in standalone mode, configured by CFG1 and CFG2 as a TMC2100 is (SilentStepStick FAQ).
 DriverChip tmc2130() {
   DriverChip chip;
@@ -278,9 +286,9 @@ DriverChip cl57t() {
 }  // namespace
 
 const std::vector<DriverChip>& namedChips() {
-  static const std::vector<DriverChip> chips{a4988(),   drv8825(), tb6600(),  tmc2208(),
-                                             tmc2209(), tmc2130(), drv8434(), lv8729(),
-                                             tb6560(),  dm542(),   dm556(),   cl57t()};
+  static const std::vector<DriverChip> chips{a4988(),   drv8825(), tb6600(),  tmc2208(), tmc2209(),
+                                             tmc2226(), tmc2130(), drv8434(), lv8729(),  tb6560(),
+                                             dm542(),   dm556(),   cl57t()};
   return chips;
 }
 

@@ -14,6 +14,9 @@ namespace stepdriver::gpio {
 // NOLINTNEXTLINE(performance-unnecessary-value-param): a board that knows its edges keeps it
 void Board::watchInput(int /*line*/, EdgeListener /*listener*/) {}
 
+// NOLINTNEXTLINE(performance-unnecessary-value-param): a board with serial ports keeps it
+void Board::setTimeSource(std::function<std::int64_t()> /*now*/) {}
+
 struct SimulatedBackend::Shared {
   Shared(Board& wired_board, TimeSource time_source)
       : board(wired_board), now(std::move(time_source)) {}
@@ -137,9 +140,15 @@ class SimulatedBackend::HeldLines : public Lines {
 };
 
 SimulatedBackend::SimulatedBackend(Board& board, TimeSource now)
-    : shared_(std::make_shared<Shared>(board, std::move(now))) {}
+    : shared_(std::make_shared<Shared>(board, now)) {
+  board.setTimeSource(std::move(now));
+}
 
-SimulatedBackend::~SimulatedBackend() = default;
+SimulatedBackend::~SimulatedBackend() { shared_->board.setTimeSource({}); }
+
+std::string SimulatedBackend::serialDevice(const std::string& port) {
+  return shared_->board.serialDevice(port);
+}
 
 std::unique_ptr<Lines> SimulatedBackend::request(const std::vector<OutputRequest>& outputs,
                                                  const std::vector<InputRequest>& inputs) {

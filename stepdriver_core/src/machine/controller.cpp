@@ -24,6 +24,10 @@ constexpr const char* kPositionRemedy =
 constexpr const char* kOutputRemedy = "then call recover, and switch it again";
 constexpr const char* kPowerRemedy =
     "check the relay, its supply and fuse, and the wiring of the feedback, then call recover";
+// A fault of a chip with a serial port is known within this time, and that of the wire: a silent
+// chip takes a tenth of a second for its three tries, and up to four share a port.
+constexpr pulse::Nanoseconds kPollPeriod = 250'000'000;
+
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
     "call "
@@ -79,6 +83,7 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   showIo();
   if (!requests_.named.outputs.areBeingWritten()) stops_concluded_ = context_.stops_handled;
   context_.pin_done.reset();
+  context_.register_done.reset();
   for (const auto& axis : context_.axes) axis->rememberRest();
   if (!requests_.awaiting_rest.empty()) {
     const bool rests = std::none_of(context_.axes.begin(), context_.axes.end(),
@@ -93,6 +98,16 @@ pulse::Nanoseconds Controller::due() const {
   pulse::Nanoseconds due = std::min({activities_.due(), context_.motor_power.due(),
                                      requests_.named.outputs.due(), requests_.named.inputs.due()});
   for (const auto& axis : context_.axes) due = std::min(due, idleDue(*axis));
+  return due;
+}
+
+pulse::Nanoseconds Controller::pollDue() const {
+  pulse::Nanoseconds due = pulse::kNever;
+  for (const auto& axis : context_.axes) {
+    for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
+      if (const motor::TmcChip* chip = axis->motor.tmcAt(i)) due = std::min(due, pollDue(*chip));
+    }
+  }
   return due;
 }
 
@@ -221,6 +236,7 @@ void Controller::supervise() {
                         kTakenOver);
     }
     superviseIdle(*axis);
+    superviseChips(*axis);
   }
   disables_all_ = false;
   activities_.poll();
@@ -290,6 +306,45 @@ void Controller::superviseIdle(axis::AxisModel& axis) {
   activities_.begin(std::make_unique<activity::GoIdle>(context_, axis), kTakenOver);
 }
 
+// ---- chips with a serial port ----
+
+pulse::Nanoseconds Controller::pollDue(const motor::TmcChip& chip) const {
+  const bool answers =
+      chip.isSetUp() && chip.polling == 0 && context_.mode.powered && context_.mode.closed.empty();
+  return answers ? chip.next_poll : pulse::kNever;
+}
+
+void Controller::superviseChips(axis::AxisModel& axis) {
+  for (std::size_t i = 0; i < axis.motor.chips(); ++i) {
+    motor::TmcChip* chip = axis.motor.tmcAt(i);
+    if (chip == nullptr || context_.now < pollDue(*chip)) continue;
+    bus::RegisterJob job = chip->poll();
+    job.id = chip->polling = context_.newJob();
+    context_.out->register_jobs.push_back(std::move(job));
+  }
+}
+
+void Controller::on(const bus::RegisterDone& done) {
+  context_.register_done = done;
+  for (const auto& axis : context_.axes) {
+    for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
+      motor::TmcChip* chip = axis->motor.tmcAt(i);
+      if (chip == nullptr || chip->polling != done.id) continue;
+      chip->polling = 0;
+      chip->next_poll = context_.now + kPollPeriod;
+      // Its supply was switched off meanwhile, or its registers are being written again.
+      if (!chip->isSetUp() || !context_.mode.powered) return;
+      const std::string fault = chip->takePoll(done);
+      axis->motor.noteChips();
+      if (fault.empty() || axis->fault) return;
+      axis->fault.latch(axis->chipText(i) + " " + fault, chip->remedy());
+      axis->distrust();
+      axis->noteStop();
+      return;
+    }
+  }
+}
+
 // ---- requests ----
 
 void Controller::on(const Requested& requested) {
@@ -326,6 +381,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   state.endstops_met = axis.endstops_met;
   state.stops = axis.stops;
   state.position_note = axis.position.note();
+  state.drivers = axis.motor.driverStates();
   shown.steps_per_unit = axis.stepsPerUnit();
   shown.origin = axis.position.origin();
   shown.backlash = axis.backlash();

@@ -33,6 +33,9 @@ class Controller {
 
   /// Clock time by which it needs a TimerDue.
   pulse::Nanoseconds due() const;
+  /// Clock time from which on a TimerDue asks a driver chip how it is. It is no reason for a clock
+  /// to go on that stands still while nothing is waited for.
+  pulse::Nanoseconds pollDue() const;
   /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
   bool watchesInputs() const {
     return activities_.watchInputs() || context_.motor_power.watchesInputs() ||
@@ -52,6 +55,7 @@ class Controller {
   void on(const InputRead& read) { context_.levels.update(read.input, read.level); }
   void on(const InputEdge& edge) { context_.levels.add(edge.edge); }
   void on(const activity::PinDone& done) { context_.pin_done = done; }
+  void on(const bus::RegisterDone& done);
   void on(const TimerDue& /*due*/) {}
 
   // The engine.
@@ -63,6 +67,9 @@ class Controller {
   bool superviseOutputs();
   void showIo();
   void superviseIdle(axis::AxisModel& axis);
+  void superviseChips(axis::AxisModel& axis);
+  /// When a chip is asked how it is; kNever: not, for now.
+  pulse::Nanoseconds pollDue(const motor::TmcChip& chip) const;
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
   AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;
 

@@ -220,6 +220,12 @@ void FlightRecorder::addInput(const Input& input) {
                                   gpio::errorText(done->error)));
     }
     jobs_.erase(job);
+  } else if (const auto* access = std::get_if<bus::RegisterDone>(&input.what)) {
+    if (access->failure == bus::Failure::kNone) return;
+    note(input.now, access->failure == bus::Failure::kPort
+                        ? access->port_error
+                        : fmt::format("register {:02X}h of a driver chip: {}",
+                                      access->failed_number, bus::causeOf(access->failure)));
   }
 }
 

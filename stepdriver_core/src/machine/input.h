@@ -49,7 +49,7 @@ struct Input {
   pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
   std::uint64_t stops_asked = 0;   ///< emergency stops that were requested
   std::variant<Requested, EngineNews, EngineHangs, InputRead, InputEdge, activity::PinDone,
-               TimerDue>
+               bus::RegisterDone, TimerDue>
       what;
 };
 

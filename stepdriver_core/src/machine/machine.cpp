@@ -6,11 +6,13 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <utility>
 
+#include "bus/serial_port.h"
 #include "controller.h"
 #include "flight_recorder.h"
 #include "give_way.h"
@@ -44,6 +46,19 @@ constexpr double kKept = 0.5;
 // [s] The bounds of the timeout of setpoints.
 constexpr double kShortestTimeout = 0.005;
 constexpr double kLongestTimeout = 60.0;
+
+/// The devices behind the serial ports of the drivers.
+std::map<std::string, std::string> devicesOf(const std::vector<config::AxisConfig>& axes,
+                                             gpio::Backend& backend) {
+  std::map<std::string, std::string> devices;
+  for (const config::AxisConfig& axis : axes) {
+    for (std::size_t i = 0; i < axis.motors(); ++i) {
+      const auto& tmc = axis.motorAt(i).tmc;
+      if (tmc) devices.emplace(tmc->port, backend.serialDevice(tmc->port));
+    }
+  }
+  return devices;
+}
 
 }  // namespace
 
@@ -97,6 +112,10 @@ class Machine::Impl {
       if (on_io_) on_io_(states);
     };
     shell_options.recorder = recorder_.get();
+    shell_options.open_port = [devices = devicesOf(configs, backend)](const std::string& port,
+                                                                      int baud) {
+      return std::make_unique<bus::SerialPort>(devices.at(port), baud);
+    };
     shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring, shell_options);
     for (std::size_t i = 0; i < configs.size(); ++i) {
       auto axis = std::make_unique<MachineAxis>(configs[i], i, wiring.motor_lines[i], *shell_,

@@ -68,7 +68,8 @@ Shell::Shell(Controller& controller, pulse::PulseEngine& engine, pulse::Clock& c
             if (recorder != nullptr) recorder->addWrite(write, clock_.now());
           }),
       core_(controller, engine, clock, lines_, wiring.inputs.size(), *this, options.recorder),
-      snapshot_(core_.snapshot()) {
+      snapshot_(core_.snapshot()),
+      ports_(options.open_port, options.threaded, [this] { wakeUp(); }) {
   engine_.listen(*this);
   if (!threaded_) return;
   try {
@@ -189,7 +190,7 @@ bool Shell::pump(const std::function<bool()>& ready, const Patience& patience) {
     const pulse::Nanoseconds due = std::min({engine_due_, core_.due(), end});
     if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
     const pulse::Nanoseconds next_look = patience.often ? clock_.now() + kOften : pulse::kNever;
-    clock_.waitUntil(std::min({due, next_look, next_reading}));
+    clock_.waitUntil(std::min({due, core_.dueWithPolls(), next_look, next_reading}));
   }
 }
 
@@ -211,7 +212,7 @@ void Shell::advance(pulse::Nanoseconds time) {
   const pulse::Nanoseconds end = clock_.now() + time;
   for (;;) {
     settle();
-    const pulse::Nanoseconds due = std::min(engine_due_, core_.due());
+    const pulse::Nanoseconds due = std::min(engine_due_, core_.dueWithPolls());
     if (due > end && clock_.now() >= end) return;
     clock_.waitUntil(std::min(due, end));
   }
@@ -277,7 +278,7 @@ void Shell::run() {
   bool holding = false;
   for (;;) {
     std::int64_t until = writers_.deadline().value_or(pulse::kNever);
-    if (clock_.realtime()) until = std::min(until, core_.due());
+    if (clock_.realtime()) until = std::min(until, core_.dueWithPolls());
     if (mustWatchPulses()) until = std::min(until, next_look_ns_);
     if (!beginRound()) break;
     wake_.wait(until);
@@ -290,7 +291,7 @@ void Shell::run() {
     watchPulses();
     if (!clock_.realtime()) pulse_thread_->setAlarm(alarm());
     // Time stands still until the engine has accepted the orders and the lines are written.
-    if (!core_.ordersAreOpen() && writers_.idle()) {
+    if (!core_.ordersAreOpen() && writers_.idle() && ports_.idle()) {
       clock_.release();
       holding = false;
     }
@@ -343,10 +344,13 @@ void Shell::watchPulses() {
 }
 
 // When virtual time must stand still for the controller. The thread that watches the inputs takes
-// real time, in which virtual time could run far past the change of a switch.
+// real time, in which virtual time could run far past the change of a switch. Polls of driver chips
+// alone don't move a clock that stands still while nothing happens: it would never rest.
 pulse::Nanoseconds Shell::alarm() const {
-  return core_.watchesInputs() ? std::min(core_.due(), clock_.now() + kVirtualInputPeriod)
-                               : core_.due();
+  const bool time_passes =
+      clock_.passesByItself() || core_.due() != pulse::kNever || mustWatchPulses();
+  const pulse::Nanoseconds due = time_passes ? core_.dueWithPolls() : core_.due();
+  return core_.watchesInputs() ? std::min(due, clock_.now() + kVirtualInputPeriod) : due;
 }
 
 // Without threads. This runs for each edge, and few edges concern the controller.
@@ -364,7 +368,8 @@ void Shell::settle() {
 
 // Whether there may be anything to do in a turn.
 bool Shell::isAwaited() {
-  return wake_.consume() || core_.hasNews() || clock_.now() >= core_.due() || core_.hasInput();
+  return wake_.consume() || core_.hasNews() || clock_.now() >= core_.dueWithPolls() ||
+         core_.hasInput();
 }
 
 // @return whether the controller was told anything.
@@ -385,6 +390,10 @@ bool Shell::turn() {
   bool any = core_.takeNews();
   for (const gpio::LineWriters::Done& done : writers_.collect()) {
     core_.handle(activity::PinDone{done.id, done.error});
+    any = true;
+  }
+  for (bus::RegisterDone& done : ports_.collect()) {
+    core_.handle(std::move(done));
     any = true;
   }
   while (core_.takeInput()) {
@@ -412,5 +421,7 @@ void Shell::turnEnded(const MachineSnapshot& before,
 }
 
 void Shell::write(const activity::PinJob& job) { writers_.write(job.id, {job.output, job.level}); }
+
+void Shell::access(const bus::RegisterJob& job) { ports_.begin(job); }
 
 }  // namespace stepdriver::machine

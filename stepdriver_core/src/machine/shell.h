@@ -13,6 +13,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "bus/bus_threads.h"
 #include "gpio/line_writers.h"
 #include "pulse/futex.h"
 #include "pulse/pulse_engine.h"
@@ -41,6 +42,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
     /// Called when a line with a name has changed, by the same thread.
     std::function<void(const IoStates&)> on_io;
     FlightRecorder* recorder = nullptr;  ///< outlives the shell; nullptr: nothing is recorded
+    bus::BusThreads::Open open_port;     ///< opens the serial ports of driver chips
   };
 
   /// @param controller, engine, clock outlive the shell. @param wiring what the lines are.
@@ -99,6 +101,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   void turnEnded(const MachineSnapshot& before, const std::shared_ptr<const MachineSnapshot>& now,
                  activity::Outputs& out) override;
   void write(const activity::PinJob& job) override;
+  void access(const bus::RegisterJob& job) override;
 
   struct Patience {
     std::chrono::nanoseconds longest = std::chrono::nanoseconds::max();
@@ -157,6 +160,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   std::int64_t next_look_ns_ = 0;
   pulse::Nanoseconds engine_due_ = 0;
 
+  bus::BusThreads ports_;
   std::optional<pulse::PulseThread> pulse_thread_;
   std::thread watcher_;
   std::thread thread_;

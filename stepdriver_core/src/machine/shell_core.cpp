@@ -24,6 +24,7 @@ ShellCore::ShellCore(Controller& controller, pulse::PulseEngine& engine, pulse::
       posted_marks_(engine.outputs()),
       snapshot_(controller.snapshot()),
       due_(controller.due()),
+      poll_due_(controller.pollDue()),
       watches_(controller.watchesInputs()) {
   watchInputs(nullptr, 0);
 }
@@ -121,7 +122,7 @@ bool ShellCore::takeRequest() {
 }
 
 bool ShellCore::takeTime() {
-  if (clock_.now() < due_) return false;
+  if (clock_.now() < dueWithPolls()) return false;
   handle(TimerDue{});
   return true;
 }
@@ -137,6 +138,7 @@ void ShellCore::handle(decltype(Input::what) what) {
   ++turns_begun_;
   controller_.handle(input, out);
   due_ = controller_.due();
+  poll_due_ = controller_.pollDue();
   watches_ = controller_.watchesInputs();
   const std::shared_ptr<const MachineSnapshot> before =
       std::exchange(snapshot_, controller_.snapshot());
@@ -154,6 +156,7 @@ void ShellCore::carryOut(activity::Outputs& out) {
   outbox_.insert(outbox_.end(), out.commands.begin(), out.commands.end());
   postCommands();
   for (const activity::PinJob& job : out.pin_jobs) host_.write(job);
+  for (const bus::RegisterJob& job : out.register_jobs) host_.access(job);
 }
 
 void ShellCore::postCommands() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <deque>
@@ -38,6 +39,9 @@ class ShellCore {
                            activity::Outputs& out) = 0;
     /// Writes a line that the pulse thread doesn't time. The end of the write is a PinDone.
     virtual void write(const activity::PinJob& job) = 0;
+    /// Begins a job on a serial port. Its end is a bus::RegisterDone. A host without ports is never
+    /// asked: no chip of its axes has one.
+    virtual void access(const bus::RegisterJob& /*job*/) {}
   };
 
   /// @param controller, engine, clock, host outlive it. @param recorder does too; nullptr: nothing
@@ -83,8 +87,11 @@ class ShellCore {
   /// @}
   void handle(decltype(Input::what) what);
 
-  /// When takeTime() has something to do.
+  /// When takeTime() has something to do that somebody waits for, and when it has anything to do.
+  /// @{
   pulse::Nanoseconds due() const { return due_; }
+  pulse::Nanoseconds dueWithPolls() const { return std::min(due_, poll_due_); }
+  /// @}
   bool watchesInputs() const { return watches_; }
   const std::shared_ptr<const MachineSnapshot>& snapshot() const { return snapshot_; }
   /// Whether the engine hasn't taken an order yet.
@@ -129,6 +136,7 @@ class ShellCore {
   // Of the controller, which changes only when it handles an input.
   std::shared_ptr<const MachineSnapshot> snapshot_;
   pulse::Nanoseconds due_;
+  pulse::Nanoseconds poll_due_;
   bool watches_;
 };
 

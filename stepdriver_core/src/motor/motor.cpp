@@ -26,6 +26,11 @@ Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int chan
       enables_.push_back({own.enable, own.enable_line, own.enable_line->join()});
     }
   }
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    const config::MotorConfig& motor = config.motorAt(i);
+    tmcs_.push_back(motor.tmc ? std::make_unique<TmcChip>(motor) : nullptr);
+  }
+  noteChips();
 }
 
 void Motor::update(const pulse::ChannelState& state) {
@@ -49,6 +54,27 @@ motion::MotionState Motor::stateAt(std::int64_t at) const {
   if (last == nullptr || state_.end != pulse::EndReason::kDone) return {count, 0.0, 0.0};
   const motion::DoubleDouble rest = last->planned.plan()->endPosition();
   return {std::abs((rest - count).value()) <= 0.5 ? rest : count, 0.0, 0.0};
+}
+
+void Motor::alignTranslator(std::size_t motor) {
+  const double microsteps = tmcs_.at(motor)->mscnt() * translators_.at(motor).microsteps();
+  const auto index = std::llround(microsteps / driver::tmc::kFinest);
+  translators_.at(motor).wentHome(countOf(motor) - index);
+}
+
+void Motor::noteChips() {
+  auto states = std::make_shared<std::vector<driver::DriverState>>();
+  for (const auto& chip : tmcs_) {
+    if (chip != nullptr) states->push_back(chip->state());
+  }
+  if (!states->empty()) driver_states_ = std::move(states);
+}
+
+void Motor::forgetRegisters() {
+  for (const auto& chip : tmcs_) {
+    if (chip != nullptr) chip->forget();
+  }
+  noteChips();
 }
 
 bool Motor::areAtHome() const {

@@ -15,6 +15,8 @@
 #include "profile/input_shaper.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/driver/driver_state.h"
+#include "tmc_chip.h"
 #include "translator.h"
 
 namespace stepdriver::motor {
@@ -67,6 +69,23 @@ class Motor {
   bool areAtHome() const;
   /// That of a motor has gone Home.
   void wentHome(std::size_t motor) { translators_.at(motor).wentHome(countOf(motor)); }
+  /// @}
+
+  /// @name Chips with a serial port
+  /// @{
+  /// That of a motor; nullptr: it has none.
+  TmcChip* tmcAt(std::size_t motor) { return tmcs_.at(motor).get(); }
+  const TmcChip* tmcAt(std::size_t motor) const { return tmcs_.at(motor).get(); }
+  std::size_t chips() const { return tmcs_.size(); }
+  /// The chip of a motor is set up: its place in the electrical cycle is known.
+  void alignTranslator(std::size_t motor);
+  /// What they have told, for readers; nullptr if there is none. @pre noteChips() after each change
+  const std::shared_ptr<const std::vector<driver::DriverState>>& driverStates() const {
+    return driver_states_;
+  }
+  void noteChips();
+  /// All of them have lost their registers.
+  void forgetRegisters();
   /// @}
 
   /// @name Motors that step together
@@ -126,7 +145,9 @@ class Motor {
   std::uint64_t serial_ = 0;
   Power power_;
   Brake brake_;
-  std::vector<Translator> translators_;  // by motor
+  std::vector<Translator> translators_;         // by motor
+  std::vector<std::unique_ptr<TmcChip>> tmcs_;  // by motor
+  std::shared_ptr<const std::vector<driver::DriverState>> driver_states_;
   std::vector<EnableShare> enables_;
   pulse::MotorCounts square_lags_{};
   bool pins_doubtful_ = false;

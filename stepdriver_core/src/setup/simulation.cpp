@@ -109,6 +109,10 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
     spec.brake = sim::BrakeSpec{axis.brake->line, axis.brake->release_level, axis.brake->release_ns,
                                 axis.brake->engage_ns};
   }
+  if (axis.tmc) {
+    const bool is_2208 = axis.driver.name == "tmc2208";
+    spec.tmc = sim::TmcSpec{axis.tmc->port, axis.tmc->address, is_2208 ? 0x20 : 0x21, true};
+  }
   spec.load_falls = simulated.load_falls;
   if (simulated.spring_hz > 0.0) {
     spec.spring = sim::SpringSpec{simulated.spring_hz, simulated.spring_damping};

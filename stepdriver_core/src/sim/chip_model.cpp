@@ -197,6 +197,16 @@ void ChipModel::checkReadiness(std::int64_t time_ns) {
   }
 }
 
+void ChipModel::configure(int microsteps, bool outputs_on, std::int64_t time_ns) {
+  if (by_registers_ && decoded_ != microsteps) {
+    mode_changed_ns_ = time_ns;
+    checkTime(step_active_ns_, time_ns, chip_.timing.mode_hold_ns, Violation::kModeHold);
+  }
+  by_registers_ = true;
+  decoded_ = microsteps;
+  outputs_on_ = outputs_on;
+}
+
 void ChipModel::onMode(std::int64_t time_ns) {
   if (!decodes_) return;
   decode();
@@ -206,6 +216,7 @@ void ChipModel::onMode(std::int64_t time_ns) {
 }
 
 std::optional<int> ChipModel::decodedMicrosteps() const {
+  if (by_registers_) return decoded_;
   if (!decodes_) return declared_microsteps_;
   return driver::microstepsOf(chip_,
                               {at(Pin::kMs1).level, at(Pin::kMs2).level, at(Pin::kMs3).level});
@@ -216,6 +227,11 @@ std::int64_t ChipModel::advance(bool forward) {
   microsteps_ = decoded_.value_or(microsteps_);
   const std::int64_t unit = finest_ / microsteps_;
   const std::int64_t before = translator_;
+  if (by_registers_) {
+    // Such a chip adds to its counter, wherever that is.
+    translator_ += forward ? unit : -unit;
+    return translator_ - before;
+  }
   // From a position that a coarser mode doesn't have, it goes to the next one that the mode has.
   translator_ =
       forward ? (floorDivide(before, unit) + 1) * unit : -(floorDivide(-before, unit) + 1) * unit;

@@ -42,7 +42,11 @@ class ChipModel {
 
   /// The level of the pin's line.
   bool lineLevel(Pin pin) const { return at(pin).level != at(pin).inverted; }
-  bool energized() const { return enabled() && awake() && !inReset(); }
+  /// The level of a pin as the chip sees it.
+  bool level(Pin pin) const { return at(pin).level; }
+  bool energized() const { return enabled() && awake() && !inReset() && outputs_on_; }
+  /// Registers, and not pins, select the microsteps from now on, and switch the outputs.
+  void configure(int microsteps, bool outputs_on, std::int64_t time_ns);
   /// What ends a latched fault has happened.
   bool endsFault() const {
     if (chip_.fault_end == driver::FaultEnd::kReset) return inReset();
@@ -100,7 +104,9 @@ class ChipModel {
   std::int64_t step_inactive_ns_ = kForEver;
   std::int64_t mode_changed_ns_ = kForEver;
   std::int64_t translator_ = 0;
-  std::optional<int> decoded_;  // mode selected by the microstep pins
+  std::optional<int> decoded_;  // mode selected by the microstep pins, or by registers
+  bool by_registers_ = false;
+  bool outputs_on_ = true;
   int microsteps_;
   std::map<Violation, std::int64_t> violations_;
 };

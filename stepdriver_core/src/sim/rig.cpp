@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -13,8 +14,10 @@
 
 #include "power_relay.h"
 #include "rig_axis.h"
+#include "serial_terminals.h"
 #include "stepdriver_core/error.h"
 #include "trace_feed.h"
+#include "uart_wire.h"
 
 namespace stepdriver::sim {
 namespace {
@@ -82,9 +85,17 @@ class Rig::Impl {
     if (motor_power) wire(*motor_power);
     for (const RigOutput& output : io.outputs) wire(output);
     for (const RigInput& input : io.inputs) wire(input);
+    connectSerial();
   }
 
   ~Impl() { feed.finish(summary()); }
+
+  /// An axis whose chip has a serial interface.
+  RigAxis& serialAxisOf(const std::string& name) const {
+    RigAxis& axis = axisOf(name);
+    if (!axis.hasSerial()) throw Error("the chip of axis " + name + " has no serial interface");
+    return axis;
+  }
 
   RigAxis& axisOf(const std::string& name) const {
     for (const auto& axis : axes) {
@@ -175,8 +186,51 @@ class Rig::Impl {
   std::vector<int> watched;           // those of them with a listener
   std::atomic<int> failing_lines{0};  // those with a write_fault: each write asks
   std::int64_t latest_ns = kForEver;
+  std::function<std::int64_t()> time_source;   // empty: the rig's latest time counts
+  std::map<std::string, UartWire> wires;       // by port
+  std::unique_ptr<SerialTerminals> terminals;  // its thread ends before the rest goes
 
  private:
+  // The clock may ask the rig: it isn't asked with the rig's mutex.
+  std::int64_t timeOfBytes() {
+    std::function<std::int64_t()> now;
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      now = time_source;
+    }
+    return now ? now() : kForEver;
+  }
+
+  void connectSerial() {
+    std::vector<std::string> ports;
+    for (const auto& axis : axes) {
+      if (!axis->hasSerial()) continue;
+      const TmcSpec& spec = *axis->spec().tmc;
+      ports.push_back(spec.port);
+      UartWire::Chip chip;
+      chip.address = spec.address;
+      chip.has_power = [this, &own = *axis] { return own.serialHasPower(latest_ns); };
+      chip.read = [this, &own = *axis](int number) { return own.readRegister(number, latest_ns); };
+      chip.write = [this, &own = *axis](int number, std::uint32_t value) {
+        own.writeRegister(number, value, latest_ns);
+      };
+      wires[spec.port].add(std::move(chip));
+    }
+    if (ports.empty()) return;
+    terminals = std::make_unique<SerialTerminals>(
+        ports,
+        [this](const std::string& port, const std::uint8_t* bytes, std::size_t count, bool pause) {
+          const std::int64_t now_ns = timeOfBytes();
+          const std::lock_guard<std::mutex> lock(mutex);
+          advance(now_ns);
+          UartWire& wire = wires.at(port);
+          if (pause) wire.pause();
+          std::vector<std::uint8_t> heard = wire.send(bytes, count);
+          switchesMoved(latest_ns);
+          return heard;
+        });
+  }
+
   void couple(const RigCoupling& coupling) const {
     std::vector<RigAxis*> coupled;
     for (const std::string& name : coupling.axes) coupled.push_back(&axisOf(name));
@@ -328,6 +382,41 @@ void Rig::placeCarriage(const std::string& axis, double position, std::int64_t t
   const std::int64_t now_ns = impl_->advance(time_ns);
   impl_->axisOf(axis).placeCarriage(position, now_ns);
   impl_->switchesMoved(now_ns);
+}
+
+void Rig::brownOut(const std::string& axis) { powerChip(axis, true); }
+
+void Rig::powerChip(const std::string& axis, bool has_power) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->serialAxisOf(axis).powerChip(has_power, impl_->latest_ns);
+  impl_->switchesMoved(impl_->latest_ns);
+}
+
+void Rig::setTrouble(const std::string& axis, const TmcTrouble& trouble) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->serialAxisOf(axis).setTrouble(trouble, impl_->latest_ns);
+  impl_->switchesMoved(impl_->latest_ns);
+}
+
+void Rig::setWireFaults(const std::string& port, const WireFaults& faults) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const auto wire = impl_->wires.find(port);
+  if (wire == impl_->wires.end()) throw Error("the rig has no chip on the serial port " + port);
+  wire->second.setFaults(faults);
+}
+
+std::uint32_t Rig::registerOf(const std::string& axis, int number) const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return impl_->serialAxisOf(axis).writtenRegister(number);
+}
+
+void Rig::setTimeSource(std::function<std::int64_t()> now) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->time_source = std::move(now);
+}
+
+std::string Rig::serialDevice(const std::string& port) {
+  return impl_->terminals != nullptr ? impl_->terminals->pathOf(port) : port;
 }
 
 void Rig::clockStalled() {

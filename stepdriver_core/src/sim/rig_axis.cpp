@@ -13,6 +13,10 @@
 namespace stepdriver::sim {
 namespace {
 
+// Without a step for so long, a chip with registers says that it stands still: 2^20 clocks of 12
+// MHz.
+constexpr std::int64_t kStandstillNs = 87'000'000;
+
 const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const std::vector<int>& known = spec.chip.microsteps;
   const bool is_known =
@@ -60,6 +64,11 @@ RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
   if (spec_.brake) brake_.emplace(*spec_.brake);
   if (spec_.motor) swing_.emplace(*spec_.motor);
   if (spec_.spring) mass_.emplace(spec_.spring->frequency, spec_.spring->damping, spec_.start);
+  if (spec_.tmc) {
+    tmc_.emplace(*spec_.tmc);
+    chip_.configure(tmc_->microsteps(), tmc_->outputsOn(), kForEver);
+    energized_ = chip_.energized();
+  }
   settle(kForEver);
 }
 
@@ -138,6 +147,10 @@ void RigAxis::meetPower(std::int64_t time_ns) {
   if (!powers_up_ || time_ns < power_from_ns_) return;
   powers_up_ = false;
   chip_.powerUp();
+  if (tmc_) {
+    tmc_->reset();
+    chip_.configure(tmc_->microsteps(), tmc_->outputsOn(), time_ns);
+  }
   if (spec_.chip.fault_end != driver::FaultEnd::kItself) mendChip();
   energized_ = isEnergizedAt(time_ns);
   if (energized_) snapRotor(time_ns);
@@ -146,7 +159,9 @@ void RigAxis::meetPower(std::int64_t time_ns) {
 }
 
 void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t time_ns) {
-  if (chip_.endsFault() || time_ns >= chip_fault_ends_ns_) mendChip();
+  const bool outputs_are_off = tmc_ && !tmc_->outputsOn();
+  if (chip_.endsFault() || outputs_are_off || time_ns >= chip_fault_ends_ns_) mendChip();
+  meetTrouble(time_ns);
   const bool was_energized = energized_;
   energized_ = isEnergizedAt(time_ns);
   if (pulse) takePulse(*pulse, time_ns);
@@ -157,6 +172,7 @@ void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t 
 
 void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   ++(pulse.forward ? pulses_forward_ : pulses_backward_);
+  last_pulse_ns_ = time_ns;
   judge(pulse.forward, time_ns);
   for (const Side side : {Side::kMin, Side::kMax}) {
     SwitchModel* const contact = drives_.empty() ? switchAt(side) : nullptr;
@@ -316,6 +332,56 @@ void RigAxis::mendChip() {
   chip_fault_ = false;
   chip_fault_ends_ns_ = kNever;
   if (fault_) fault_->stick({});
+}
+
+// ---- a serial interface ----
+
+std::uint32_t RigAxis::readRegister(int number, std::int64_t time_ns) const {
+  TmcModel::Senses senses;
+  senses.enn = chip_.level(Pin::kEnable);
+  senses.step = chip_.level(Pin::kStep);
+  senses.dir = chip_.level(Pin::kDir);
+  senses.diag = chip_fault_;
+  senses.outputs_failed = chip_fault_;
+  const std::int64_t cycle = chip_.cycle();
+  senses.mscnt = static_cast<int>((chip_.translator() % cycle + cycle) % cycle);
+  senses.standstill = last_pulse_ns_ == kForEver || time_ns - last_pulse_ns_ >= kStandstillNs;
+  return tmc_->read(number, senses);
+}
+
+void RigAxis::writeRegister(int number, std::uint32_t value, std::int64_t time_ns) {
+  advance(time_ns);
+  tmc_->write(number, value);
+  takeRegisters(time_ns);
+}
+
+void RigAxis::takeRegisters(std::int64_t time_ns) {
+  chip_.configure(tmc_->microsteps(), tmc_->outputsOn(), time_ns);
+  follow({}, time_ns);
+}
+
+void RigAxis::powerChip(bool has_power, std::int64_t time_ns) {
+  advance(time_ns);
+  tmc_->setPower(has_power);
+  tmc_->reset();
+  chip_.powerUp();
+  mendChip();
+  takeRegisters(time_ns);
+}
+
+void RigAxis::setTrouble(const TmcTrouble& trouble, std::int64_t time_ns) {
+  advance(time_ns);
+  tmc_->setTrouble(trouble);
+  takeRegisters(time_ns);
+}
+
+// A short circuit, and too much heat, switch the outputs off until they are disabled.
+void RigAxis::meetTrouble(std::int64_t time_ns) {
+  if (!tmc_ || chip_fault_ || !chip_.energized()) return;
+  const TmcTrouble& trouble = tmc_->trouble();
+  if (!trouble.over_temperature && !trouble.short_a && !trouble.short_b) return;
+  tmc_->noteDriverError();
+  breakChip(time_ns);
 }
 
 void RigAxis::turnBy(double way, std::int64_t time_ns) {

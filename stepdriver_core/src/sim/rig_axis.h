@@ -13,6 +13,7 @@
 #include "spring_mass.h"
 #include "stepdriver_core/sim/rig.h"
 #include "switch_model.h"
+#include "tmc_model.h"
 
 namespace stepdriver::sim {
 
@@ -53,6 +54,18 @@ class RigAxis {
   SwitchModel* inPositionContact() { return in_position_ ? &*in_position_ : nullptr; }
   void setFaults(const RigFaults& faults, std::int64_t time_ns);
   void placeCarriage(double position, std::int64_t time_ns);
+  /// @name Its chip's serial interface; it must have one
+  /// @{
+  bool hasSerial() const { return tmc_.has_value(); }
+  bool serialHasPower(std::int64_t time_ns) const {
+    return tmc_->spec().has_power && time_ns >= power_from_ns_;
+  }
+  std::uint32_t readRegister(int number, std::int64_t time_ns) const;
+  std::uint32_t writtenRegister(int number) const { return tmc_->written(number); }
+  void writeRegister(int number, std::uint32_t value, std::int64_t time_ns);
+  void powerChip(bool has_power, std::int64_t time_ns);
+  void setTrouble(const TmcTrouble& trouble, std::int64_t time_ns);
+  /// @}
   void clockStalled() {
     if (judge_) judge_->forget();
   }
@@ -76,6 +89,8 @@ class RigAxis {
   void noteTurn();
   void judge(bool forward, std::int64_t time_ns);
   void breakChip(std::int64_t time_ns);
+  void takeRegisters(std::int64_t time_ns);
+  void meetTrouble(std::int64_t time_ns);
   void mendChip();
   void settle(std::int64_t time_ns);
   void snapRotor(std::int64_t time_ns);
@@ -101,6 +116,7 @@ class RigAxis {
 
   const RigAxisSpec spec_;
   ChipModel chip_;
+  std::optional<TmcModel> tmc_;
   bool energized_;
   // The place at which the rotor comes to rest, in microsteps of the finest mode from its position
   // when the rig was made.
@@ -127,6 +143,7 @@ class RigAxis {
   Slides& slides_;
   std::optional<MotionJudge> judge_;
   bool last_forward_ = false;  // the direction of the last pulse
+  std::int64_t last_pulse_ns_ = kForEver;
   std::int64_t power_from_ns_ = kForEver;
   bool powers_up_ = false;  // as soon as the power is there
 };

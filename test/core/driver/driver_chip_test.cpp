@@ -131,8 +131,9 @@ TEST(Chip, ListsTheMicrostepsThatItsPinsSelect) {
 
 TEST(Chip, IsFoundByTheNameInConfigurations) {
   EXPECT_EQ(driverChipNames(),
-            (std::vector<std::string>{"a4988", "drv8825", "tb6600", "tmc2208", "tmc2209", "tmc2130",
-                                      "drv8434", "lv8729", "tb6560", "dm542", "dm556", "cl57t"}));
+            (std::vector<std::string>{"a4988", "drv8825", "tb6600", "tmc2208", "tmc2209", "tmc2226",
+                                      "tmc2130", "drv8434", "lv8729", "tb6560", "dm542", "dm556",
+                                      "cl57t"}));
   for (const std::string& name : driverChipNames()) {
     ASSERT_NE(findDriverChip(name), nullptr) << name;
     EXPECT_EQ(findDriverChip(name), &driverChip(name)) << name;
@@ -158,6 +159,7 @@ TEST(Chip, KeepsTheTimingOfItsDatasheet) {
       {"tb6600", 5'000, 5'000, 5'000, 0, 200'000'000, 0},
       {"tmc2208", 200, 200, 20, 1'000, 1'000'000, 0},
       {"tmc2209", 200, 200, 20, 1'000, 1'000'000, 0},
+      {"tmc2226", 200, 200, 20, 1'000, 1'000'000, 0},
       {"tmc2130", 200, 200, 20, 1'000, 1'000'000, 0},
       {"drv8434", 1'000, 1'000, 200, 200, 5'000, 2'000'000},
       {"lv8729", 1'000, 1'000, 500, 500, 1'000'000, 2'000'000},
@@ -201,7 +203,8 @@ TEST(Chip, KnowsItsPinsAndTheirLevels) {
       {"tmc2209", 'L', '-', '-', 'H', counts}, {"tmc2130", 'L', '-', '-', '-', counts},
       {"drv8434", 'H', 'L', '-', 'L', held},   {"lv8729", 'L', 'L', '-', '-', held},
       {"tb6560", 'L', '-', '-', '-', held},    {"dm542", 'L', '-', '-', '-', held},
-      {"dm556", 'L', '-', '-', '-', held},     {"cl57t", 'L', '-', '-', 'H', held}};
+      {"dm556", 'L', '-', '-', '-', held},     {"cl57t", 'L', '-', '-', 'H', held},
+      {"tmc2226", 'L', '-', '-', 'H', counts}};
   EXPECT_EQ(datasheets.size(), driverChipNames().size());
   for (const LevelFigures& sheet : datasheets) {
     const DriverChip& chip = driverChip(sheet.chip);
@@ -218,7 +221,8 @@ TEST(Chip, KnowsItsPinsAndTheirLevels) {
 TEST(Chip, KnowsWhatEndsAFaultAndWhetherItSaysThatItIsInPosition) {
   const std::map<std::string, FaultEnd> ends{{"drv8825", FaultEnd::kReset},
                                              {"tmc2208", FaultEnd::kEnable},
-                                             {"tmc2209", FaultEnd::kEnable}};
+                                             {"tmc2209", FaultEnd::kEnable},
+                                             {"tmc2226", FaultEnd::kEnable}};
   for (const std::string& name : driverChipNames()) {
     const DriverChip& chip = driverChip(name);
     EXPECT_EQ(chip.fault_end, ends.count(name) > 0 ? ends.at(name) : FaultEnd::kPower) << name;

@@ -89,6 +89,7 @@ inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
     spec.brake = sim::BrakeSpec{config.brake->line, config.brake->release_level,
                                 config.brake->release_ns, config.brake->engage_ns};
   }
+  if (config.tmc) spec.tmc = sim::TmcSpec{config.tmc->port, config.tmc->address, 0x21, true};
   spec.min_switch = endstop(config.endstop_min, -100.0);
   spec.max_switch = endstop(config.endstop_max, 100.0);
   return spec;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/driver/driver_state.h"
 
 namespace stepdriver::axis {
 
@@ -112,6 +113,8 @@ struct AxisState {
   /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
   /// none.
   std::string position_note;
+  /// Of each motor whose chip has a serial port, what the chip said last; nullptr: no chip has one.
+  std::shared_ptr<const std::vector<driver::DriverState>> drivers;
 };
 
 /// Levels of the switches as their lines read now: true if active, empty if there is no switch.

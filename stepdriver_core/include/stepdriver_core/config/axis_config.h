@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stepdriver_core/bias.h"
+#include "stepdriver_core/config/tmc_config.h"
 #include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/kinematics/kinematics.h"
 
@@ -130,6 +131,8 @@ struct MotorConfig {
   std::string motor;          ///< its name; empty: it is the only one
   driver::DriverChip driver;  ///< with the overrides of the configuration
   Pins pins;
+  /// Empty: the chip is configured by its pins alone.
+  std::optional<TmcConfig> tmc;
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
   std::optional<FaultPin> fault;

@@ -99,6 +99,10 @@ class Backend {
   /// @throw GpioError naming the line, the reason and the remedy.
   virtual std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
                                          const std::vector<InputRequest>& inputs) = 0;
+
+  /// The path of the device that is behind a configured serial port: that path itself, unless the
+  /// lines are simulated.
+  virtual std::string serialDevice(const std::string& port) { return port; }
 };
 
 }  // namespace stepdriver::gpio

@@ -48,6 +48,14 @@ class Board {
   /// When this returns, the earlier listener isn't called anymore. A board that doesn't know when
   /// its inputs change needn't override this: waiting for edges then ends with the timeout.
   virtual void watchInput(int line, EdgeListener listener);
+
+  /// The clock that stamps the edges: a board with serial ports asks it when bytes come. The
+  /// backend calls this once; a board without such ports needn't override it.
+  virtual void setTimeSource(std::function<std::int64_t()> now);
+
+  /// The path of the terminal that the board has behind a serial port; the port itself if it has
+  /// none.
+  virtual std::string serialDevice(const std::string& port) { return port; }
 };
 
 /// Simulated lines, with a Board wired to them. Every name is a line, and each can be held once.
@@ -67,6 +75,7 @@ class SimulatedBackend : public Backend {
   /// @throw GpioError if a line is named twice or is held by an earlier request (EBUSY).
   std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
                                  const std::vector<InputRequest>& inputs) override;
+  std::string serialDevice(const std::string& port) override;
 
  private:
   struct Shared;

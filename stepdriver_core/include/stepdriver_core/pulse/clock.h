@@ -47,6 +47,9 @@ class Clock {
   /// serve it then sleep most of the time, and request to run before others when they wake up.
   virtual bool keepsRealTime() const { return realtime(); }
 
+  /// Whether time passes while nothing is waited for.
+  virtual bool passesByItself() const { return true; }
+
   /// While anyone holds the clock, a virtual clock stands still; a real one continues.
   virtual void hold() {}
   virtual void release() {}
@@ -108,6 +111,7 @@ class VirtualClock : public Clock {
   /// How often a wait has ended late. For any thread.
   std::uint64_t stalls() const { return stalls_.load(std::memory_order_acquire); }
   bool keepsRealTime() const override { return speed_ > 0.0 && speed_ <= 1.0; }
+  bool passesByItself() const override { return speed_ > 0.0; }
   void hold() override;
   void release() override;
 

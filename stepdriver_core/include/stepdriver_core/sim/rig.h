@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -98,6 +99,34 @@ struct MotorSpec {
 /// @param acceleration [full steps/s^2] its highest one
 MotorSpec soundMotor(MotorSpec motor, double rate, double acceleration);
 
+/// The serial interface of a chip on the rig.
+struct TmcSpec {
+  std::string port;       ///< as configured: chips of the same port share a wire
+  int address = 0;        ///< as its address pins are strapped
+  int version = 0x21;     ///< of IOIN: 20h of a TMC2208, 21h of a TMC2209
+  bool has_power = true;  ///< false: it doesn't answer
+};
+
+/// What happens to the bytes on the wire of a serial port of the rig: each byte is lost, doubled or
+/// gets a wrong bit with this probability. The sequence is the same each time.
+struct WireFaults {
+  double lost = 0.0;
+  double doubled = 0.0;
+  double flipped = 0.0;
+  bool no_echo = false;  ///< the port doesn't hear what it sends
+};
+
+/// What a chip with a serial interface measures on the rig.
+struct TmcTrouble {
+  bool prewarning = false;  ///< it is above 120 degrees
+  bool over_temperature = false;
+  bool short_a = false;  ///< to ground: its outputs are off until they are disabled
+  bool short_b = false;
+  bool undervoltage = false;  ///< of the charge pump: its outputs are off
+  bool open_a = false;
+  bool open_b = false;
+};
+
 /// An axis of the rig, as it is built and wired.
 struct RigAxisSpec {
   std::string name;
@@ -119,6 +148,9 @@ struct RigAxisSpec {
   std::optional<SpringSpec> spring;
   std::optional<MotorLimits> limits;  ///< empty: its motor may do anything
   std::optional<MotorSpec> motor;     ///< empty: its rotor follows the field whatever comes
+  /// Empty: the chip has no serial interface. Otherwise it begins with its registers reset: its
+  /// microsteps are those of its address pins until they are written.
+  std::optional<TmcSpec> tmc;
 };
 
 /// Axes whose motors together move their carriages, as on a CoreXY. A turn of the n-th axis's motor
@@ -303,6 +335,22 @@ class Rig : public gpio::Board {
   /// Something has stopped the clock, so that the next steps may be late: speeds and accelerations
   /// are then judged again from the second step on.
   void clockStalled();
+
+  /// @name Chips with a serial interface
+  /// @throw Error if the axis, or the port, has none.
+  /// @{
+  /// The chip loses its supply for a moment: its registers and its translator are reset.
+  void brownOut(const std::string& axis);
+  /// The chip has power, or none: then it doesn't answer. Its registers are reset when it comes.
+  void powerChip(const std::string& axis, bool has_power);
+  void setTrouble(const std::string& axis, const TmcTrouble& trouble);
+  void setWireFaults(const std::string& port, const WireFaults& faults);
+  /// What was written last to a register of the chip, whether it can be read or not.
+  std::uint32_t registerOf(const std::string& axis, int number) const;
+  void setTimeSource(std::function<std::int64_t()> now) override;
+  /// The path of the terminal with the chips of a port; the port itself if no chip has it.
+  std::string serialDevice(const std::string& port) override;
+  /// @}
 
   /// Makes the trace readable up to its last edge while the rig lives.
   ///

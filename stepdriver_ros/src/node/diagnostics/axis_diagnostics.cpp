@@ -68,6 +68,31 @@ void addValues(const config::AxisConfig& config, const AxisReading& reading,
   status.add("jerk [" + unit + "/s^3]", limits.jerk);
 }
 
+// What the chips say that have a serial port.
+void reportDrivers(const axis::AxisState& state, DiagnosticStatusWrapper& status) {
+  if (!state.drivers) return;
+  for (const driver::DriverState& driver : *state.drivers) {
+    const std::string of = driver.motor.empty() ? "" : " of motor " + driver.motor;
+    if (driver.temperature_warning) {
+      status.mergeSummary(DiagnosticStatus::WARN,
+                          "the driver" + of + " is hot, and will soon switch itself off");
+    }
+    status.add("driver" + of, driver.is_set_up ? "set up" : "not set up");
+    status.add("run current" + of + " [A]", roundedText(driver.run_current));
+    status.add("hold current" + of + " [A]", roundedText(driver.hold_current));
+    status.add("current scale" + of + " [1/32]", driver.present_scale + 1);
+    status.add("temperature" + of, driver.at_least_celsius > 0
+                                       ? fmt::format("above {} C", driver.at_least_celsius)
+                                       : "below 120 C");
+    status.add("chopper" + of, driver.stealth_chop ? "StealthChop" : "SpreadCycle");
+    status.add("open coils" + of, driver.open_load_a   ? driver.open_load_b ? "A and B" : "A"
+                                  : driver.open_load_b ? "B"
+                                                       : "none");
+    status.add("register accesses" + of, driver.transactions);
+    status.add("register accesses tried again" + of, driver.retries);
+  }
+}
+
 }  // namespace
 
 void reportAxis(const config::AxisConfig& config, const AxisReading& reading,
@@ -97,6 +122,7 @@ void reportAxis(const config::AxisConfig& config, const AxisReading& reading,
   }
   warnNearLimit(config, state.position, status);
   addValues(config, reading, status);
+  reportDrivers(state, status);
 }
 
 }  // namespace stepdriver::ros_node

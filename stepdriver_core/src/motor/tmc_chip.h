@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bus/register_job.h"
+#include "driver/tmc_registers.h"
+#include "stepdriver_core/config/axis_config.h"
+#include "stepdriver_core/driver/driver_state.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::motor {
+
+/// The registers of a motor's driver chip, as the controller knows them: what is to be written, and
+/// what the answers mean. It has no port.
+class TmcChip {
+ public:
+  /// @param motor has a TmcConfig; outlives it.
+  explicit TmcChip(const config::MotorConfig& motor);
+
+  const config::TmcConfig& config() const { return *motor_.tmc; }
+
+  /// All registers, in their order, each write verified; then the chip's flags are cleared and
+  /// read. The chip's version comes first: another chip is left alone.
+  ///
+  /// @param port_addresses of all chips on its wire, which must not answer too soon.
+  bus::RegisterJob setUp(int microsteps, const std::vector<int>& port_addresses) const;
+  /// Another microstep mode. MSCNT is read before and after: the place in the electrical cycle must
+  /// stay.
+  bus::RegisterJob changeMode(int microsteps) const;
+  /// What the chip says of itself.
+  bus::RegisterJob poll() const;
+
+  /// Takes the answers to setUp(). @return why the chip isn't ready; empty if it is.
+  std::string takeSetUp(const bus::RegisterDone& done);
+  /// Takes the answers to changeMode(). @return why the mode isn't changed; empty if it is.
+  std::string takeMode(const bus::RegisterDone& done);
+  /// Takes the answers to poll(). @return a fault, without the name of the chip; empty if there is
+  ///   none.
+  std::string takePoll(const bus::RegisterDone& done);
+
+  /// [1/256 full step] Its place in the electrical cycle when it was set up.
+  int mscnt() const { return mscnt_; }
+  /// All its registers are as they must be, as far as it is known.
+  bool isSetUp() const { return state_.is_set_up; }
+  /// They aren't any more: the chip has lost them, or it doesn't answer.
+  void forget() { state_.is_set_up = false; }
+  const driver::DriverState& state() const { return state_; }
+  /// The remedy for the fault that takeSetUp(), takeMode() or takePoll() said last.
+  const std::string& remedy() const { return remedy_; }
+
+  /// @name The poll under way, which the controller asks for
+  /// @{
+  std::uint64_t polling = 0;  ///< its job; 0: none
+  pulse::Nanoseconds next_poll = 0;
+  /// @}
+
+ private:
+  using Accesses = std::vector<bus::RegisterAccess>;
+
+  bus::RegisterJob jobOf(Accesses accesses) const;
+  bus::RegisterAccess read(std::uint8_t number, std::uint32_t volatile_bits = 0) const;
+  void count(const bus::RegisterDone& done);
+  std::string failureText(const bus::RegisterDone& done);
+  void takeStatus(std::uint32_t status);
+  /// What of these flags stops the motor.
+  std::string faultOf(std::uint32_t gstat, std::uint32_t status);
+
+  const config::MotorConfig& motor_;
+  const driver::tmc::Settings settings_;
+  const std::uint32_t version_;
+  driver::DriverState state_;
+  std::string remedy_;
+  int mscnt_ = 0;
+};
+
+}  // namespace stepdriver::motor

@@ -1,0 +1,131 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/config/check_axes.h"
+#include "support/axis_config.h"
+
+namespace stepdriver::config {
+namespace {
+
+ConfigValue tmcAxis(const std::string& lines = "gpiochip0") {
+  ConfigValue axis = linearAxis(lines);
+  put(axis, "driver", std::string("tmc2209"));
+  put(axis, "tmc/port", std::string("/dev/serial0"));
+  put(axis, "tmc/address", 1);
+  put(axis, "tmc/sense_resistor_mohm", 110.0);
+  put(axis, "tmc/run_current_a", 0.8);
+  return axis;
+}
+
+TEST(ReadTmc, TakesAChipOnAUart) {
+  const AxisConfig config = readX(tmcAxis());
+  ASSERT_TRUE(config.tmc);
+  EXPECT_EQ(config.tmc->port, "/dev/serial0");
+  EXPECT_EQ(config.tmc->baud, 115'200);
+  EXPECT_EQ(config.tmc->address, 1);
+  EXPECT_DOUBLE_EQ(config.tmc->sense_resistor, 0.11);
+  EXPECT_DOUBLE_EQ(config.tmc->run_current, 0.8);
+  EXPECT_DOUBLE_EQ(config.tmc->hold_current, 0.4);
+  EXPECT_EQ(config.tmc->mode, ChopperMode::kStealthChop);
+  EXPECT_TRUE(config.tmc->interpolate);
+  EXPECT_FALSE(readX(linearAxis()).tmc);
+}
+
+TEST(ReadTmc, HasEachPowerOfTwoAsMicrosteps) {
+  for (int microsteps = 1; microsteps <= 256; microsteps *= 2) {
+    ConfigValue axis = tmcAxis();
+    put(axis, "microsteps", microsteps);
+    EXPECT_EQ(readX(axis).microsteps, microsteps);
+  }
+  ConfigValue axis = tmcAxis();
+  put(axis, "microsteps", 5);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("microsteps", "is 5, but must be 1, 2, 4, 8, 16, 32, 64, 128 or 256"));
+}
+
+TEST(ReadTmc, RefusesWrongValues) {
+  expectIssues(
+      tmcAxis(),
+      {{"tmc/port", std::string("serial0"),
+        "is \"serial0\", but must be the path of a serial port, such as \"/dev/serial0\""},
+       {"tmc/baud", 250'000,
+        "is 250000, but must be 9600, 19200, 38400, 57600, 115200, 230400, 460800 or "
+        "500000"},
+       {"tmc/address", 4, "is 4, but must be from 0 to 3"},
+       {"tmc/sense_resistor_mohm", 1.0, "is 1.0, but must be from 10 to 1000"},
+       {"tmc/mode", std::string("quiet"), "is \"quiet\", but must be stealthchop or spreadcycle"},
+       {"tmc/run_current_a", 11.0,
+        "is 11, but must be from 0.030596 to 1.76776: with a sense resistor of 110.0 mOhm the "
+        "board makes no other current; read the value off the board"},
+       {"tmc/hold_current_a", 0.9,
+        "is 0.9, but must be from 0.030596 to 0.8: with a sense resistor of 110.0 mOhm the board "
+        "makes no other current; read the value off the board"}});
+}
+
+// The current shows that the resistor is wrong by a factor.
+TEST(ReadTmc, RefusesACurrentThatTheBoardCannotMake) {
+  ConfigValue axis = tmcAxis();
+  put(axis, "tmc/sense_resistor_mohm", 900.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("tmc/run_current_a",
+                    "is 0.8, but must be from 0.00432335 to 0.249793: with a sense resistor of "
+                    "900.0 mOhm the board makes no other current; read the value off the board"));
+}
+
+TEST(ReadTmc, SaysWhatIsMissing) {
+  expectMissing(tmcAxis(), {{"tmc/port", "a string"},
+                            {"tmc/address", "an integer from 0 to 3"},
+                            {"tmc/sense_resistor_mohm", "a number from 10 to 1000"},
+                            {"tmc/run_current_a", "a number above 0"}});
+}
+
+TEST(ReadTmc, IsOnlyForChipsWithAUart) {
+  ConfigValue axis = tmcAxis();
+  put(axis, "driver", std::string("a4988"));
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc",
+                                     "is given, but is only for tmc2208, tmc2209 and "
+                                     "tmc2226; the driver is the A4988"));
+}
+
+TEST(ReadTmc, KnowsThatATmc2208HasOneAddress) {
+  ConfigValue axis = tmcAxis();
+  put(axis, "driver", std::string("tmc2208"));
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/address",
+                                     "is 1, but a TMC2208 has no address pins: it must be 0, and "
+                                     "the chip alone on its port"));
+  drop(axis, "tmc/address");
+  EXPECT_EQ(readX(axis).tmc->address, 0);
+}
+
+TEST(ReadTmc, NeedsAnAddressAndARateForEachChipOfAPort) {
+  ConfigValue second = tmcAxis("gpiochip1");
+  EXPECT_EQ(issuesOf(mapOf({{"x", tmcAxis()}, {"y", second}})),
+            Lines{"/axes/y/tmc/address: is 1, but must be another one: it is /axes/x/tmc/address "
+                  "already, on the same port"});
+  put(second, "tmc/address", 2);
+  EXPECT_EQ(issuesOf(mapOf({{"x", tmcAxis()}, {"y", second}})), Lines{});
+  put(second, "tmc/baud", 9600);
+  EXPECT_EQ(issuesOf(mapOf({{"x", tmcAxis()}, {"y", second}})),
+            Lines{"/axes/y/tmc/baud: is 9600, but must be 115200, as /axes/x/tmc/baud: it is the "
+                  "same port"});
+}
+
+TEST(ReadTmc, LeavesNoMicrostepPins) {
+  ConfigValue axis = tmcAxis();
+  put(axis, "pins/ms1", std::string("M"));
+  EXPECT_EQ(issuesOfX(axis), lineOfX("pins/ms1",
+                                     "is \"M\", but the TMC2209 has no microstep pins "
+                                     "with `tmc`: MS1 and MS2 are its address"));
+}
+
+TEST(ReadTmc, OfAProgramIsCheckedByTheSameRules) {
+  std::vector<AxisConfig> axes{readX(tmcAxis())};
+  EXPECT_NO_THROW(checkAxes(axes));
+  axes[0].tmc->run_current = 5.0;
+  EXPECT_THROW(checkAxes(axes), ConfigError);
+}
+
+}  // namespace
+}  // namespace stepdriver::config

@@ -1,0 +1,318 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bus/serial_port.h"
+#include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/error.h"
+#include "support/bench.h"
+#include "support/tmc_axis.h"
+
+namespace stepdriver {
+namespace {
+
+using test::Bench;
+using test::tmcAxis;
+using test::violationsOf;
+
+constexpr int kGconf = 0x00;
+constexpr int kIholdIrun = 0x10;
+constexpr int kVactual = 0x22;
+constexpr int kChopconf = 0x6C;
+constexpr const char* kPort = "/dev/serial0";
+
+std::vector<config::AxisConfig> fourAxes() {
+  return {tmcAxis("x", 0), tmcAxis("y", 1), tmcAxis("z", 2), tmcAxis("a", 3)};
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+// The message of an action that fails; empty if it succeeds.
+std::string failureOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(TmcDrivers, AreSetUpBeforeTheyAreEnabled) {
+  Bench bench(fourAxes());
+  for (const std::string name : {"x", "y", "z", "a"}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(bench.axis(name).state().fault, "");
+    EXPECT_EQ(bench.rig.registerOf(name, kGconf), 0x1C0U);
+    EXPECT_EQ(bench.rig.registerOf(name, kVactual), 0U);
+    // 0.8 A of at most 0.979 A with 0.11 Ohm and vsense 1: 26 of 32; at rest 13 of 32.
+    EXPECT_EQ(bench.rig.registerOf(name, kIholdIrun) & 0x1F1FU, 0x190CU);
+    EXPECT_EQ(bench.rig.registerOf(name, kChopconf) >> 24U & 0xFU, 4U);
+    bench.move(0.01, name);
+    EXPECT_NEAR(bench.report(name).carriage, 10.0, 1e-9);
+    EXPECT_EQ(bench.report(name).microsteps, 16);
+    EXPECT_EQ(violationsOf(bench.report(name)), "");
+    const auto drivers = bench.axis(name).state().drivers;
+    ASSERT_TRUE(drivers);
+    ASSERT_EQ(drivers->size(), 1U);
+    EXPECT_TRUE(drivers->front().is_set_up);
+    EXPECT_NEAR(drivers->front().run_current, 0.795, 0.001);
+    EXPECT_EQ(drivers->front().retries, 0U);
+  }
+}
+
+TEST(TmcDrivers, AreSetUpByThreadsToo) {
+  Bench bench(fourAxes(), true);
+  for (const std::string name : {"x", "y", "z", "a"}) {
+    bench.move(0.002, name);
+    EXPECT_EQ(bench.axis(name).state().fault, "");
+    EXPECT_EQ(violationsOf(bench.report(name)), "");
+  }
+}
+
+// A clock that moves from event to event would otherwise never rest.
+TEST(TmcDrivers, AreNoReasonForAVirtualClockToGoOn) {
+  Bench bench({tmcAxis()}, true);
+  bench.axis().setPosition(0.0);
+  const pulse::Nanoseconds before = bench.clock.now();
+  for (int i = 0; i < 300; ++i) bench.axis().setPosition(0.001 * i);
+  EXPECT_EQ(bench.clock.now(), before);
+}
+
+TEST(TmcDrivers, AreAskedWhileAVirtualClockMoves) {
+  Bench bench({tmcAxis()}, true);
+  bench.may_exceed_limits = true;
+  bench.axis().setPosition(0.0);
+  bench.rig.brownOut("x");
+  EXPECT_EQ(bench.axis().wait(bench.axis().moveTo(0.09)).end, axis::MoveEnd::kFault);
+  EXPECT_PRED2(has, bench.axis().state().fault, "the TMC2209 was reset");
+}
+
+// Its outputs are off while its registers are written, and it may hold a load.
+TEST(TmcDrivers, KeepTheirCurrentAtRecoverIfTheyHaveNoFault) {
+  Bench bench({tmcAxis("x", 0), tmcAxis("y", 1)});
+  bench.axis("y").setPosition(0.0);
+  bench.machine->advance(0.1);
+  const std::uint64_t before = bench.axis("y").state().drivers->front().transactions;
+  bench.rig.brownOut("x");
+  bench.machine->advance(0.5);
+  bench.machine->recover();
+  EXPECT_EQ(bench.axis("x").state().fault, "");
+  EXPECT_TRUE(bench.axis("x").state().drivers->front().is_set_up);
+  EXPECT_TRUE(bench.axis("y").state().position_valid);
+  // Two reads for each look at it, and none of its writes.
+  EXPECT_LE(bench.axis("y").state().drivers->front().transactions, before + 8);
+}
+
+TEST(TmcDrivers, MakeTheSameStepsAsDriversWithPins) {
+  config::AxisConfig pins = tmcAxis();
+  pins.tmc.reset();
+  pins.driver = driver::driverChip("tmc2209");
+  Bench with({tmcAxis()});
+  Bench without({pins});
+  with.machine->advance(1.0);
+  without.machine->advance(1.0);
+  const auto duration = [](Bench& bench) { return bench.move(0.05).duration; };
+  EXPECT_EQ(duration(with), duration(without));
+  EXPECT_EQ(with.pulses(), without.pulses());
+}
+
+TEST(TmcDrivers, ChangeTheirMicrostepsByTheirRegister) {
+  Bench bench({tmcAxis()});
+  bench.axis().setPosition(0.0);
+  for (const int microsteps : {256, 1, 128, 2, 16}) {
+    SCOPED_TRACE(microsteps);
+    bench.axis().setMicrosteps(microsteps);
+    EXPECT_EQ(bench.axis().state().microsteps, microsteps);
+    bench.move(0.002);
+    EXPECT_NEAR(bench.report().carriage, 2.0, 1e-9);
+    bench.move(0.0);
+    EXPECT_NEAR(bench.report().carriage, 0.0, 1e-9);
+    EXPECT_EQ(bench.report().microsteps, microsteps);
+    EXPECT_TRUE(bench.axis().state().position_valid);
+  }
+  EXPECT_EQ(violationsOf(bench.report()), "");
+  EXPECT_TRUE(has(failureOf([&] { bench.axis().setMicrosteps(5); }), "has no 1/5 mode"));
+}
+
+struct Trouble {
+  const char* name;
+  std::function<void(sim::Rig&, bool there)> set;
+  const char* fault;
+  const char* remedy;
+};
+class TmcFaults : public ::testing::TestWithParam<Trouble> {};
+
+template <bool sim::TmcTrouble::*member>
+void setTrouble(sim::Rig& rig, bool there) {
+  sim::TmcTrouble trouble;
+  trouble.*member = there;
+  rig.setTrouble("x", trouble);
+}
+
+// Each stops the axis within 1.5 s, is named with its cause, makes the position doubtful, and stays
+// until its cause is gone and recover has written all registers again.
+TEST_P(TmcFaults, AreTold) {
+  const Trouble& trouble = GetParam();
+  Bench bench({tmcAxis("x", 0), tmcAxis("y", 1)});
+  // A chip without its registers makes larger steps, until that is known.
+  bench.may_exceed_limits = true;
+  axis::Axis& x = bench.axis();
+  x.setPosition(0.0);
+  const axis::Move move = x.moveTo(0.09);
+  bench.machine->advance(0.1);
+  trouble.set(bench.rig, true);
+  bench.machine->advance(1.5);
+  EXPECT_PRED2(has, x.state().fault, trouble.fault);
+  EXPECT_PRED2(has, x.state().remedy, trouble.remedy);
+  EXPECT_FALSE(x.state().moving);
+  EXPECT_FALSE(x.state().position_valid);
+  EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kFault);
+  // Noise is on the wire of both.
+  EXPECT_EQ(bench.axis("y").state().fault.empty(), std::string(trouble.name) != "Noise");
+  if (std::string(trouble.name) != "Reset") {
+    EXPECT_PRED2(has, failureOf([&] { bench.machine->recover(); }), trouble.fault);
+    EXPECT_PRED2(has, x.state().fault, trouble.fault);
+  }
+  trouble.set(bench.rig, false);
+  bench.machine->recover();
+  EXPECT_EQ(x.state().fault, "");
+  EXPECT_EQ(bench.rig.registerOf("x", kGconf), 0x1C0U);
+  EXPECT_EQ(bench.rig.registerOf("x", kChopconf) >> 24U & 0xFU, 4U);
+  const double before = bench.report().carriage;
+  x.wait(x.moveTo(0.001, true));
+  EXPECT_NEAR(bench.report().carriage, before + 1.0, 1e-9);
+  bench.machine->advance(1.0);
+  EXPECT_EQ(x.state().fault, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    , TmcFaults,
+    ::testing::Values(Trouble{"Reset",
+                              [](sim::Rig& rig, bool there) {
+                                if (there) rig.brownOut("x");
+                              },
+                              "the TMC2209 was reset", "motor supply"},
+                      Trouble{"OverTemperature", setTrouble<&sim::TmcTrouble::over_temperature>,
+                              "over-temperature", "cool"},
+                      Trouble{"ShortOfCoilA", setTrouble<&sim::TmcTrouble::short_a>,
+                              "a short circuit of coil A to ground", "motor's wires"},
+                      Trouble{"ShortOfCoilB", setTrouble<&sim::TmcTrouble::short_b>,
+                              "a short circuit of coil B to ground", "motor's wires"},
+                      Trouble{"Undervoltage", setTrouble<&sim::TmcTrouble::undervoltage>,
+                              "undervoltage", "motor supply"},
+                      Trouble{"Silence",
+                              [](sim::Rig& rig, bool there) { rig.powerChip("x", !there); },
+                              "no chip answers", "PDN_UART"},
+                      Trouble{"Noise",
+                              [](sim::Rig& rig, bool there) {
+                                sim::WireFaults faults;
+                                faults.flipped = there ? 1.0 : 0.0;
+                                rig.setWireFaults(kPort, faults);
+                              },
+                              "damaged", "wire"}),
+    [](const auto& trouble) { return std::string(trouble.param.name); });
+
+TEST(TmcDrivers, WarnOfHeatAndOpenCoilsWithoutAFault) {
+  Bench bench({tmcAxis()});
+  sim::TmcTrouble trouble;
+  trouble.prewarning = trouble.open_b = true;
+  bench.rig.setTrouble("x", trouble);
+  bench.machine->advance(0.6);
+  EXPECT_EQ(bench.axis().state().fault, "");
+  const driver::DriverState driver = bench.axis().state().drivers->front();
+  EXPECT_TRUE(driver.temperature_warning);
+  EXPECT_EQ(driver.at_least_celsius, 120);
+  EXPECT_TRUE(driver.open_load_b);
+  EXPECT_FALSE(driver.open_load_a);
+}
+
+// A few bytes in a thousand are tried again, and nobody notices.
+TEST(TmcDrivers, WorkOnANoisyWire) {
+  Bench bench({tmcAxis()});
+  sim::WireFaults faults;
+  faults.lost = faults.doubled = faults.flipped = 0.001;
+  bench.rig.setWireFaults(kPort, faults);
+  bench.machine->advance(10.0);
+  EXPECT_EQ(bench.axis().state().fault, "");
+  EXPECT_GT(bench.axis().state().drivers->front().retries, 0U);
+}
+
+std::string faultAtStart(const std::vector<config::AxisConfig>& axes,
+                         const std::vector<sim::RigAxisSpec>& rig) {
+  Bench bench(axes, rig);
+  EXPECT_FALSE(bench.axis().state().enabled);
+  return bench.axis().state().fault;
+}
+
+TEST(TmcDrivers, NameAWrongAddress) {
+  std::vector<sim::RigAxisSpec> rig = Bench::rigAxes({tmcAxis()});
+  rig[0].tmc->address = 2;
+  const std::string fault = faultAtStart({tmcAxis()}, rig);
+  EXPECT_PRED2(has, fault, "on /dev/serial0 at address 0, no chip answers");
+}
+
+TEST(TmcDrivers, NameTheChipThatIsThere) {
+  std::vector<sim::RigAxisSpec> rig = Bench::rigAxes({tmcAxis()});
+  rig[0].tmc->version = 0x20;
+  const std::string fault = faultAtStart({tmcAxis()}, rig);
+  EXPECT_PRED2(has, fault, "says that it is a TMC2208 or TMC2225");
+}
+
+TEST(TmcDrivers, NameAMissingPort) {
+  std::vector<sim::RigAxisSpec> rig = Bench::rigAxes({tmcAxis()});
+  rig[0].tmc.reset();
+  config::AxisConfig axis = tmcAxis();
+  axis.tmc->port = "/dev/there/is/none";
+  const std::string fault = faultAtStart({axis}, rig);
+  EXPECT_PRED2(has, fault, "the serial port /dev/there/is/none can't be opened: there is no such");
+}
+
+TEST(TmcDrivers, LeaveAPortThatAnotherProgramUses) {
+  const config::AxisConfig config = tmcAxis();
+  pulse::VirtualClock clock(0.0);
+  sim::Rig rig(Bench::rigAxes({config}));
+  gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
+  machine::MachineOptions options;
+  options.threaded = false;
+  auto other = std::make_unique<bus::SerialPort>(rig.serialDevice(kPort), 115'200);
+  machine::Machine machine({config}, backend, clock, options);
+  EXPECT_PRED2(has, machine.axis("x").state().fault, "another program uses it");
+  other.reset();
+  machine.recover();
+  EXPECT_EQ(machine.axis("x").state().fault, "");
+  EXPECT_TRUE(machine.axis("x").state().drivers->front().is_set_up);
+}
+
+TEST(TmcDrivers, AreLeftAloneWhileTheyHaveNoPowerAndSetUpWhenItComes) {
+  machine::MachineOptions options;
+  options.motor_power.emplace();
+  options.motor_power->line = "power";
+  options.motor_power->on_ns = 200'000'000;
+  config::AxisConfig config = tmcAxis();
+  config.enable_on_start = false;
+  Bench bench({config}, Bench::rigAxes({config}), false, 0.0, options);
+  bench.machine->advance(1.0);
+  EXPECT_EQ(bench.axis().state().fault, "");
+  EXPECT_FALSE(bench.axis().state().drivers->front().is_set_up);
+  bench.axis().enable(true);
+  EXPECT_TRUE(bench.axis().state().drivers->front().is_set_up);
+  bench.move(0.001);
+  EXPECT_NEAR(bench.report().carriage, 1.0, 1e-9);
+  bench.machine->emergencyStop();
+  bench.machine->advance(1.0);
+  EXPECT_FALSE(bench.axis().state().drivers->front().is_set_up);
+  bench.machine->recover();
+  EXPECT_EQ(bench.axis().state().fault, "");
+  bench.axis().enable(true);
+  EXPECT_TRUE(bench.axis().state().drivers->front().is_set_up);
+  EXPECT_EQ(violationsOf(bench.report()), "");
+}
+
+}  // namespace
+}  // namespace stepdriver

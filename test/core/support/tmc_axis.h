@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include "bench.h"
+#include "stepdriver_core/driver/uart_chip.h"
+
+namespace stepdriver::test {
+
+/// linearAxis() with a TMC2209 of 0.11 Ohm on the UART /dev/serial0, at 0.8 A.
+inline config::AxisConfig tmcAxis(const std::string& name = "x", int address = 0) {
+  config::AxisConfig config = linearAxis(name, "tmc2209");
+  config.driver = driver::uartChip(config.driver);
+  for (config::Pin* pin : {&config.pins.ms1, &config.pins.ms2, &config.pins.ms3, &config.pins.sleep,
+                           &config.pins.reset}) {
+    pin->line.clear();
+  }
+  config.tmc.emplace();
+  config.tmc->port = "/dev/serial0";
+  config.tmc->address = address;
+  config.tmc->sense_resistor = 0.11;
+  config.tmc->run_current = 0.8;
+  config.tmc->hold_current = 0.4;
+  return config;
+}
+
+}  // namespace stepdriver::test
