@@ -132,10 +132,21 @@ TEST(Screen, StaleValuesAreShownAsStale) {
 
 TEST(Screen, SwitchesThatAreNotKnownAreNotShownAsOpen) {
   Session session = sessionWith({axisView("x")});
-  session.driver().forgetEndstops();
+  session.driver().forgetEvents();
   const std::string screen = screenText(session, 24, 80);
   EXPECT_FALSE(shows(screen, "open"));
   EXPECT_TRUE(shows(screen, "mm/s ?       ?"));
+}
+
+TEST(Screen, ShowsTheDriverOfTheChosenAxis) {
+  Session session = sessionWith({axisView("x"), axisView("y")});
+  session.driver().updateChips("x", "0.80 A of 0.80 A, below 120 C, load 20 %");
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "driver: 0.80 A of 0.80 A, below 120 C, load"));
+  session.press({'2'}, 0.0);
+  EXPECT_FALSE(shows(screenText(session, 24, 80), "driver:"));
+  session.press({'1'}, 0.0);
+  session.driver().forgetEvents();
+  EXPECT_FALSE(shows(screenText(session, 24, 80), "driver:"));
 }
 
 TEST(Screen, SaysLoudlyThatAnEmergencyStopWasMadeAndWhatEndsIt) {

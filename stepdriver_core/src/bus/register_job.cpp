@@ -25,6 +25,9 @@ Failure carryOut(const RegisterAccess& access, RegisterUart& uart, RegisterDone&
     case Kind::kRead:
       failure = uart.read(access.address, access.number, access.mask, value);
       break;
+    case Kind::kSample:
+      failure = uart.sample(access.address, access.number, value);
+      break;
     case Kind::kExpect:
       failure = uart.read(access.address, access.number, ~access.mask, value);
       if (failure == Failure::kNone && ((value ^ access.value) & access.mask) != 0) {

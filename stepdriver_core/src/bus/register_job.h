@@ -14,6 +14,7 @@ namespace stepdriver::bus {
 struct RegisterAccess {
   enum class Kind {
     kRead,       ///< its value is a result
+    kSample,     ///< the same, of a measured value that is another one each time
     kExpect,     ///< a read whose value must be this one in the bits of the mask
     kWrite,      ///< counted by the chip
     kWriteBack,  ///< counted by the chip, and read back

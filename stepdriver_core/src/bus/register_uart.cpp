@@ -121,6 +121,19 @@ Failure RegisterUart::read(std::uint8_t address, std::uint8_t number, std::uint3
   return Failure::kNone;
 }
 
+Failure RegisterUart::sample(std::uint8_t address, std::uint8_t number, std::uint32_t& value) {
+  Failure failure = Failure::kNone;
+  for (int i = 0; i < kTries; ++i) {
+    failure = readOnce(address, number, value);
+    if (failure == Failure::kNone) {
+      ++transactions_;
+      return failure;
+    }
+    ++retries_;
+  }
+  return failure;
+}
+
 Failure RegisterUart::write(std::uint8_t address, std::uint8_t number, std::uint32_t value) {
   const WriteFrame frame = writeFrame(address, number, value);
   for (int i = 0; i < kTries; ++i) {

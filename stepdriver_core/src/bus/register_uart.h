@@ -38,6 +38,9 @@ class RegisterUart {
   /// @throw PortError
   Failure read(std::uint8_t address, std::uint8_t number, std::uint32_t volatile_bits,
                std::uint32_t& value);
+  /// The same for a measured value, which is another one each time: it counts when the chip has
+  /// said it once. Nothing may depend on it. @throw PortError
+  Failure sample(std::uint8_t address, std::uint8_t number, std::uint32_t& value);
   /// @throw PortError
   Failure write(std::uint8_t address, std::uint8_t number, std::uint32_t value);
   /// Without a look at what comes of it, for chips that don't answer properly yet. @throw PortError

@@ -31,17 +31,17 @@ constexpr std::uint32_t kPwmconfValue = 0xC10D0024;
 // Several chips on a wire: their answers begin 3 times 8 bits after a read.
 constexpr std::uint32_t kSendDelay = 2U << 8U;
 
-int scaleBelow(double current, bool fine, double sense_resistor) {
-  const double whole = currentOf(kScales - 1, fine, sense_resistor);
-  const auto steps = static_cast<int>(std::floor(current / whole * kScales + kRounding));
-  return std::clamp(steps, 1, kScales) - 1;
-}
-
 bool needsCoarse(double current, double sense_resistor) {
   return current > currentOf(kScales - 1, true, sense_resistor) * (1.0 + kRounding);
 }
 
 }  // namespace
+
+int scaleBelow(double current, bool fine, double sense_resistor) {
+  const double whole = currentOf(kScales - 1, fine, sense_resistor);
+  const auto steps = static_cast<int>(std::floor(current / whole * kScales + kRounding));
+  return std::clamp(steps, 1, kScales) - 1;
+}
 
 std::optional<std::uint32_t> mresOf(int microsteps) {
   for (std::uint32_t mres = 0; mres <= 8; ++mres) {
@@ -79,6 +79,12 @@ std::uint32_t powerDownOf(double delay) {
       std::clamp(std::round(delay / kPowerDownUnit), kLeastPowerDown, kMostPowerDown));
 }
 
+std::uint32_t currentsOf(const CurrentScale& current) {
+  const auto hold = static_cast<std::uint32_t>(current.hold);
+  const auto run = static_cast<std::uint32_t>(current.run);
+  return hold | run << 8U | kHoldDelay;
+}
+
 std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on) {
   std::uint32_t value = kTbl | kHysteresis | *mresOf(microsteps) << kMresShift;
   if (on) value |= kToffOn;
@@ -91,14 +97,12 @@ std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on) {
 std::vector<RegisterValue> setUpOf(const Settings& settings, int microsteps) {
   std::uint32_t gconf = kGconfUartPin | kGconfMicrostepsByMres | kGconfFilter;
   if (settings.spread_cycle) gconf |= kGconfSpreadCycle;
-  const auto hold = static_cast<std::uint32_t>(settings.current.hold);
-  const auto run = static_cast<std::uint32_t>(settings.current.run);
   std::vector<RegisterValue> all{
       {kSlaveconf, kSendDelay, false},
       {kChopconf, chopconfOf(settings, microsteps, false), true},
       {kVactual, 0, false},
       {kGconf, gconf, true},
-      {kIholdIrun, hold | run << 8U | kHoldDelay, false},
+      {kIholdIrun, currentsOf(settings.current), false},
       {kTpowerdown, powerDownOf(settings.hold_delay), false},
       {kTpwmthrs, 0, false},
       {kPwmconf, kPwmconfValue, true},

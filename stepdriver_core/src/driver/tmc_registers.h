@@ -20,6 +20,7 @@ enum Register : std::uint8_t {
   kTcoolthrs = 0x14,
   kVactual = 0x22,
   kSgthrs = 0x40,
+  kSgResult = 0x41,
   kCoolconf = 0x42,
   kMscnt = 0x6A,
   kChopconf = 0x6C,
@@ -80,6 +81,8 @@ struct CurrentScale {
   bool fine = false;  ///< vsense: a lower highest current, in finer steps
 };
 
+/// The highest scale that doesn't exceed a current [A rms]; 0 if each does.
+int scaleBelow(double current, bool fine, double sense_resistor);
 /// [A rms] The current of a scale with a sense resistor [Ohm].
 double currentOf(int scale, bool fine, double sense_resistor);
 /// The lowest and the highest current that a board can make.
@@ -107,6 +110,8 @@ struct Settings {
   bool has_stall_guard = true;  ///< a TMC2209 or TMC2226
 };
 
+/// IHOLD_IRUN of these currents.
+std::uint32_t currentsOf(const CurrentScale& current);
 /// CHOPCONF in a microstep mode. @param on false: the outputs are off. @pre mresOf() has it
 std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on);
 

@@ -326,23 +326,46 @@ void Controller::superviseChips(axis::AxisModel& axis) {
 
 void Controller::on(const bus::RegisterDone& done) {
   context_.register_done = done;
+  if (const auto change = requests_.current_changes.extract(done.id)) {
+    return takeCurrent(change.mapped(), done);
+  }
   for (const auto& axis : context_.axes) {
     for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
-      motor::TmcChip* chip = axis->motor.tmcAt(i);
-      if (chip == nullptr || chip->polling != done.id) continue;
-      chip->polling = 0;
-      chip->next_poll = context_.now + kPollPeriod;
-      // Its supply was switched off meanwhile, or its registers are being written again.
-      if (!chip->isSetUp() || !context_.mode.powered) return;
-      const std::string fault = chip->takePoll(done);
-      axis->motor.noteChips();
-      if (fault.empty() || axis->fault) return;
-      axis->fault.latch(axis->chipText(i) + " " + fault, chip->remedy());
-      axis->distrust();
-      axis->noteStop();
-      return;
+      const motor::TmcChip* chip = axis->motor.tmcAt(i);
+      if (chip != nullptr && chip->polling == done.id) return takePoll(*axis, i, done);
     }
   }
+}
+
+void Controller::takePoll(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done) {
+  motor::TmcChip& chip = *axis.motor.tmcAt(motor);
+  chip.polling = 0;
+  chip.next_poll = context_.now + kPollPeriod;
+  // Its supply was switched off meanwhile, or its registers are being written again.
+  if (!chip.isSetUp() || !context_.mode.powered) return;
+  const std::string fault = chip.takePoll(done);
+  axis.motor.noteChips();
+  if (!fault.empty()) failChip(axis, motor, fault);
+}
+
+void Controller::takeCurrent(const RequestContext::CurrentChange& change,
+                             const bus::RegisterDone& done) {
+  axis::AxisModel& axis = *context_.axes.at(change.axis);
+  motor::TmcChip& chip = *axis.motor.tmcAt(change.motor);
+  const bool was_set_up = chip.isSetUp();
+  const std::string why = chip.takeCurrent(change.scale, done);
+  axis.motor.noteChips();
+  if (why.empty()) return;
+  change.call->fail({activity::Failure::Kind::kGpio,
+                     axis.name() + ": " + axis.chipText(change.motor) + " " + why});
+  if (was_set_up) failChip(axis, change.motor, why);
+}
+
+void Controller::failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault) {
+  if (axis.fault) return;
+  axis.fault.latch(axis.chipText(motor) + " " + fault, axis.motor.tmcAt(motor)->remedy());
+  axis.distrust();
+  axis.noteStop();
 }
 
 // ---- requests ----

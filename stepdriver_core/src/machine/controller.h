@@ -68,6 +68,9 @@ class Controller {
   void showIo();
   void superviseIdle(axis::AxisModel& axis);
   void superviseChips(axis::AxisModel& axis);
+  void takePoll(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done);
+  void takeCurrent(const RequestContext::CurrentChange& change, const bus::RegisterDone& done);
+  void failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault);
   /// When a chip is asked how it is; kNever: not, for now.
   pulse::Nanoseconds pollDue(const motor::TmcChip& chip) const;
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;

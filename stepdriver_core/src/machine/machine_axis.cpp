@@ -104,6 +104,8 @@ void MachineAxis::setLimits(const axis::AxisLimits& wanted) { ask(shell_, SetLim
 
 axis::AxisLimits MachineAxis::limits() const { return shell_.snapshot()->axes.at(id_).limits; }
 
+void MachineAxis::setCurrent(double run, double hold) { ask(shell_, SetCurrent{id_, run, hold}); }
+
 void MachineAxis::stop() { ask(shell_, StopAxis{id_}); }
 
 void MachineAxis::stop(const axis::Move& move) { ask(shell_, StopMove{id_, move.id}); }

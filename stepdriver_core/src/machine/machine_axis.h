@@ -34,6 +34,7 @@ class MachineAxis : public axis::Axis {
   void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since) override;
   void setLimits(const axis::AxisLimits& wanted) override;
   axis::AxisLimits limits() const override;
+  void setCurrent(double run, double hold) override;
   void stop() override;
   void stop(const axis::Move& move) override;
   axis::HomingResult home(const std::function<bool()>& cancelled) override;

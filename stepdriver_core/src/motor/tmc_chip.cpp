@@ -59,12 +59,17 @@ TmcChip::TmcChip(const config::MotorConfig& motor)
     : motor_(motor),
       settings_(settingsOf(motor)),
       version_(is2208(motor) ? kVersion2208 : kVersion2209) {
-  const auto current = [this](int scale) {
-    return tmc::currentOf(scale, settings_.current.fine, config().sense_resistor);
-  };
   state_.motor = motor.motor;
-  state_.run_current = current(settings_.current.run);
-  state_.hold_current = current(settings_.current.hold);
+  noteCurrents();
+}
+
+void TmcChip::noteCurrents() {
+  state_.run_current = currentOf(settings_.current.run);
+  state_.hold_current = currentOf(settings_.current.hold);
+}
+
+double TmcChip::currentOf(int scale) const {
+  return tmc::currentOf(scale, settings_.current.fine, config().sense_resistor);
 }
 
 bus::RegisterJob TmcChip::jobOf(Accesses accesses) const {
@@ -112,7 +117,24 @@ bus::RegisterJob TmcChip::changeMode(int microsteps) const {
 }
 
 bus::RegisterJob TmcChip::poll() const {
-  return jobOf({read(tmc::kGstat), read(tmc::kDrvStatus, tmc::kVolatileStatus)});
+  Accesses all{read(tmc::kGstat), read(tmc::kDrvStatus, tmc::kVolatileStatus)};
+  if (settings_.has_stall_guard) {
+    bus::RegisterAccess load = read(tmc::kSgResult);
+    load.kind = Kind::kSample;
+    all.push_back(load);
+  }
+  return jobOf(std::move(all));
+}
+
+tmc::CurrentScale TmcChip::scaleOf(double run, double hold) const {
+  const bool fine = settings_.current.fine;
+  return {tmc::scaleBelow(run, fine, config().sense_resistor),
+          tmc::scaleBelow(hold, fine, config().sense_resistor), fine};
+}
+
+bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) const {
+  return jobOf({{Kind::kWrite, static_cast<std::uint8_t>(config().address), tmc::kIholdIrun,
+                 tmc::currentsOf(scale), 0}});
 }
 
 void TmcChip::count(const bus::RegisterDone& done) {
@@ -163,13 +185,27 @@ std::string TmcChip::takeMode(const bus::RegisterDone& done) {
 std::string TmcChip::takePoll(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
-  takeStatus(done.values.back());
-  return faultOf(done.values.front(), done.values.back());
+  const std::uint32_t status = done.values.at(1);
+  takeStatus(status);
+  // It is measured in motion, and keeps its value at rest.
+  if (settings_.has_stall_guard && (status & tmc::kStandstill) == 0) {
+    state_.stall_guard = static_cast<int>(done.values.at(2));
+  }
+  return faultOf(done.values.front(), status);
+}
+
+std::string TmcChip::takeCurrent(const tmc::CurrentScale& scale, const bus::RegisterDone& done) {
+  count(done);
+  if (done.failure != bus::Failure::kNone) return failureText(done);
+  settings_.current = scale;
+  noteCurrents();
+  return "";
 }
 
 void TmcChip::takeStatus(std::uint32_t status) {
   const auto has = [status](std::uint32_t bit) { return (status & bit) != 0; };
-  state_.present_scale = static_cast<int>((status & tmc::kPresentScale) >> tmc::kPresentScaleShift);
+  state_.present_current =
+      currentOf(static_cast<int>((status & tmc::kPresentScale) >> tmc::kPresentScaleShift));
   state_.stealth_chop = has(tmc::kStealthChop);
   state_.temperature_warning = has(tmc::kOverTemperatureWarning);
   state_.open_load_a = has(tmc::kOpenLoadA);

@@ -32,6 +32,12 @@ class TmcChip {
   bus::RegisterJob changeMode(int microsteps) const;
   /// What the chip says of itself.
   bus::RegisterJob poll() const;
+  /// The scale of currents [A rms] in the range that is configured.
+  driver::tmc::CurrentScale scaleOf(double run, double hold) const;
+  /// [A rms] The lowest current in that range.
+  double lowestCurrent() const { return currentOf(0); }
+  /// Other currents.
+  bus::RegisterJob setCurrent(const driver::tmc::CurrentScale& scale) const;
 
   /// Takes the answers to setUp(). @return why the chip isn't ready; empty if it is.
   std::string takeSetUp(const bus::RegisterDone& done);
@@ -40,6 +46,9 @@ class TmcChip {
   /// Takes the answers to poll(). @return a fault, without the name of the chip; empty if there is
   ///   none.
   std::string takePoll(const bus::RegisterDone& done);
+  /// Takes the answer to setCurrent(), which also counts for a later setUp(). @return why the
+  ///   currents aren't changed; empty if they are.
+  std::string takeCurrent(const driver::tmc::CurrentScale& scale, const bus::RegisterDone& done);
 
   /// [1/256 full step] Its place in the electrical cycle when it was set up.
   int mscnt() const { return mscnt_; }
@@ -65,11 +74,13 @@ class TmcChip {
   void count(const bus::RegisterDone& done);
   std::string failureText(const bus::RegisterDone& done);
   void takeStatus(std::uint32_t status);
+  void noteCurrents();
+  double currentOf(int scale) const;  // [A rms]
   /// What of these flags stops the motor.
   std::string faultOf(std::uint32_t gstat, std::uint32_t status);
 
   const config::MotorConfig& motor_;
-  const driver::tmc::Settings settings_;
+  driver::tmc::Settings settings_;
   const std::uint32_t version_;
   driver::DriverState state_;
   std::string remedy_;

@@ -109,6 +109,7 @@ client::Answer carryOutCall(const std::string& driver, const Call& call, const T
 DriverClient::DriverClient(ros::NodeHandle node, Session& session,
                            const DriverParameters& parameters)
     : session_(session),
+      node_(node),
       driver_(session.driverName()),
       emergency_stop_(driver_ + "/emergency_stop"),
       jog_(node.advertise<Jog>(driver_ + "/jog", 1)) {
@@ -171,7 +172,7 @@ void DriverClient::noticeTheDriver() {
   if (live == was_live_) return;
   was_live_ = live;
   if (!live) {
-    session_.driver().forgetEndstops();
+    session_.driver().forgetEvents();
     session_.messages().say("no state of " + driver_ + " arrives any more");
     return;
   }
@@ -193,6 +194,15 @@ void DriverClient::takeParameters() {
 
 void DriverClient::configure(const DriverParameters& parameters) {
   session_.driver().configure(parameters.axes);
+  chips_.clear();
+  for (const config::AxisConfig& axis : parameters.axes) {
+    if (!axis.hasTmc()) continue;
+    chips_.push_back(node_.subscribe<DriverState>(
+        driver_ + "/" + axis.name + "/driver", kQueued,
+        [this, name = axis.name](const DriverState::ConstPtr& message) {
+          onMessage(name, *message);
+        }));
+  }
   session_.jog().setPeriod(
       std::min(parameters.jog_timeout / kMessagesInTimeout, kLongestJogPeriod));
 }
@@ -254,6 +264,25 @@ void DriverClient::onMessage(const IoStates& states) {
                       changed(states.input_changed[i]), states.input_error[i]});
   }
   session_.driver().updateIo(std::move(outputs), std::move(inputs));
+}
+
+void DriverClient::onMessage(const std::string& axis, const DriverState& chips) {
+  std::string text;
+  for (std::size_t i = 0; i < chips.motor.size(); ++i) {
+    text += text.empty() ? "" : "; ";
+    if (!chips.motor[i].empty()) text += chips.motor[i] + ": ";
+    if (chips.set_up[i] == 0) {
+      text += "not set up";
+      continue;
+    }
+    text += fmt::format("{:.2f} A of {:.2f} A, {}", chips.present_current[i], chips.run_current[i],
+                        chips.at_least_celsius[i] > 0
+                            ? fmt::format("above {} C", chips.at_least_celsius[i])
+                            : "below 120 C");
+    if (chips.temperature_warning[i] != 0) text += ", HOT";
+    if (chips.load[i] >= 0.0) text += fmt::format(", load {:.0f} %", 100.0 * chips.load[i]);
+  }
+  session_.driver().updateChips(axis, text);
 }
 
 // Jogs have no answer: only the driver's log says why one was refused.

@@ -5,6 +5,7 @@
 #include <ros/subscriber.h>
 #include <rosgraph_msgs/Log.h>
 #include <stepdriver/AxisStates.h>
+#include <stepdriver/DriverState.h>
 #include <stepdriver/Endstops.h>
 #include <stepdriver/IoStates.h>
 
@@ -48,6 +49,7 @@ class DriverClient {
   void onMessage(const AxisStates& states);
   void onMessage(const Endstops& endstops);
   void onMessage(const IoStates& states);
+  void onMessage(const std::string& axis, const DriverState& chips);
   void onMessage(const rosgraph_msgs::Log& log);
   void configure(const DriverParameters& parameters);
   void noticeTheDriver();
@@ -58,6 +60,7 @@ class DriverClient {
   TableUnits tableUnitsOf(const std::string& axis) const;
 
   Session& session_;
+  ros::NodeHandle node_;
   const std::string driver_;
   std::map<std::string, std::unique_ptr<Lane>> lanes_;  // one for each call name
   EmergencyStopClient emergency_stop_;
@@ -68,6 +71,7 @@ class DriverClient {
   ros::Subscriber endstops_;
   ros::Subscriber io_;
   ros::Subscriber log_;
+  std::vector<ros::Subscriber> chips_;  // of the axes whose drivers are on a UART
 };
 
 /// [s] The time on the clock of sessions.

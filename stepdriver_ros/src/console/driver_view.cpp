@@ -30,7 +30,13 @@ void DriverView::updateEndstops(const std::string& axis, bool min_active, bool m
   for (AxisView& view : axes_) takeSwitches(view);
 }
 
-void DriverView::forgetEndstops() {
+std::string DriverView::chipsOf(const std::string& axis) const {
+  const auto found = chips_.find(axis);
+  return found == chips_.end() ? "" : found->second;
+}
+
+void DriverView::forgetEvents() {
+  chips_.clear();
   switches_.clear();
   for (AxisView& view : axes_) takeSwitches(view);
 }

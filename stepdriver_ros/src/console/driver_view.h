@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -60,8 +61,11 @@ class DriverView {
   void update(std::vector<AxisView> axes, double now);
   /// The switches of one axis, which come in a message of their own.
   void updateEndstops(const std::string& axis, bool min_active, bool max_active);
-  /// They are published only when they change, so those of a driver that has gone are meaningless.
-  void forgetEndstops();
+  /// What the driver chips of an axis say, in words; they come in a message of their own.
+  void updateChips(const std::string& axis, const std::string& text) { chips_[axis] = text; }
+  /// Switches are published only when they change, so those of a driver that has gone are
+  /// meaningless, and what its chips have said as well.
+  void forgetEvents();
 
   /// The outputs and inputs with a name, which come at each change.
   void updateIo(std::vector<OutputView> outputs, std::vector<InputView> inputs);
@@ -81,6 +85,8 @@ class DriverView {
   /// The number of states so far.
   int updates() const { return updates_; }
   bool anyFault() const;
+  /// Empty: the axis has no chip that says anything.
+  std::string chipsOf(const std::string& axis) const;
 
  private:
   struct Switches {
@@ -95,6 +101,7 @@ class DriverView {
   std::vector<Switches> switches_;
   std::vector<OutputView> outputs_;
   std::vector<InputView> inputs_;
+  std::map<std::string, std::string> chips_;  // by axis
   std::optional<double> updated_;
   int updates_ = 0;
 };

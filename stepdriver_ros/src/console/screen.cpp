@@ -132,14 +132,19 @@ std::vector<Row> pendingRows(const Session& session, int columns, double now) {
   return rows;
 }
 
-/// What the next keys will do: the step size and the override.
+/// What the next keys will do: the step size and the override. And how the chosen axis's driver is.
 std::vector<Row> settingRows(const Session& session, int columns) {
   const auto factor = session.speedOverride();
   const config::AxisConfig* config = session.driver().config(session.chosen());
   const std::string unit = config == nullptr ? "mm" : configUnitOf(config->kind);
-  return rowsOf(fmt::format("- + steps: {}    speed override: {}", session.stepSize().text(unit),
-                            factor ? fmt::format("{:.0f} %", *factor * 100.0) : "unknown"),
-                columns);
+  std::vector<Row> rows =
+      rowsOf(fmt::format("- + steps: {}    speed override: {}", session.stepSize().text(unit),
+                         factor ? fmt::format("{:.0f} %", *factor * 100.0) : "unknown"),
+             columns);
+  if (const std::string chips = session.driver().chipsOf(session.chosen()); !chips.empty()) {
+    append(rows, rowsOf("driver: " + chips, columns));
+  }
+  return rows;
 }
 
 /// As many of the texts in each row as fit.

@@ -78,15 +78,15 @@ On SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill` it decelerates, disables 
 the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dump does.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
-              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/home
+              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/set_current  ~AXIS/home
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~enable  ~home
               ~move_line  ~follow_path  ~append_path  ~plan_path  ~hold  ~resume  ~dump
               ~set_output
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               ~rig/inputs/NAME (on the simulated rig)
-  topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~state  ~io_states
-              /diagnostics  /clock (with ~publish_clock)
+  topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~AXIS/driver  ~state
+              ~io_states  /diagnostics  /clock (with ~publish_clock)
               ~jog  ~setpoint  ~AXIS/setpoint  ~command  (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_path
               ~follow_joint_trajectory

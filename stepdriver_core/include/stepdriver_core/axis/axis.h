@@ -93,6 +93,17 @@ class Axis {
   /// The limits of the next plan.
   virtual AxisLimits limits() const = 0;
 
+  /// Changes the currents of its motors whose drivers have a config::TmcConfig, at rest or in
+  /// motion, until the machine ends. The highest step of the chip's scale that doesn't exceed the
+  /// current is taken: see driver::DriverState. Returns when the chip has it.
+  ///
+  /// @param run [A rms] in motion, at most TmcConfig::run_current; 0: as configured.
+  /// @param hold [A rms] at rest, at most that in motion; 0: as configured, or that in motion if it
+  ///   is lower.
+  /// @throw Refused if a current is out of range, if no motor has such a driver, or while one isn't
+  ///   set up. @throw GpioError if a chip doesn't take it: the axis is then at fault.
+  virtual void setCurrent(double run, double hold) = 0;
+
   /// Decelerates to rest, and returns when the pulse thread has the deceleration. The axes that
   /// move together with this one stop with it, along their path. A held goal is given up. Does
   /// nothing if the axis is at rest.

@@ -222,6 +222,14 @@ struct AxisConfig : MotorConfig {
     return false;
   }
 
+  /// Whether any of its motors has a driver with a TmcConfig.
+  bool hasTmc() const {
+    for (std::size_t i = 0; i < motors(); ++i) {
+      if (motorAt(i).tmc) return true;
+    }
+    return false;
+  }
+
   /// @name The drivers of its motors, which get the same edges at the same time
   /// @{
   /// Each edge of STEP is a step.

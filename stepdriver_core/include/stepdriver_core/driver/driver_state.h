@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace stepdriver::driver {
@@ -9,15 +10,20 @@ namespace stepdriver::driver {
 struct DriverState {
   std::string motor;       ///< of an axis with several; empty: it is the only one
   bool is_set_up = false;  ///< its registers are written and verified
-  double run_current =
-      0.0;  ///< [A rms] as set: a step of the chip's scale below what is configured
-  double hold_current = 0.0;  ///< [A rms] as set
-  int present_scale = 0;      ///< 0 to 31: the scale of the present current, CS_ACTUAL
+  /// [A rms] As set, in motion and at rest: the step of the chip's scale below what is wanted.
+  double run_current = 0.0;
+  double hold_current = 0.0;
+  /// [A rms] At this moment, on the way from one to the other.
+  double present_current = 0.0;
   bool stealth_chop = false;  ///< it chops silently at this moment
   int at_least_celsius = 0;   ///< the highest threshold that its temperature is above; 0: none
   bool temperature_warning = false;  ///< it will soon switch itself off
   bool open_load_a = false;          ///< no current flows in coil A; true at speed or at rest too
   bool open_load_b = false;
+  /// SG_RESULT in the last motion: the lower, the higher the load. It depends on the speed and the
+  /// current, and means something only while the chip chops silently. Empty: the chip hasn't
+  /// measured it.
+  std::optional<int> stall_guard;
   std::uint64_t transactions = 0;  ///< reads and writes of its registers that succeeded
   std::uint64_t retries = 0;       ///< that were tried again
 };

@@ -25,6 +25,7 @@
 #include "reset.h"
 #include "restore_position.h"
 #include "resume.h"
+#include "set_current.h"
 #include "set_limits.h"
 #include "set_microsteps.h"
 #include "set_output.h"
@@ -39,11 +40,12 @@ namespace stepdriver::machine {
 
 /// What clients and the machine itself ask of the controller. The file of each request has its
 /// values, whether it reads inputs, its text, and how it is served.
-using Request = std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints,
-                             MoveLine, FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll,
-                             Hold, Resume, SetSpeedOverride, SetLimits, Home, CancelHoming, Enable,
-                             Sleep, Reset, SetMicrosteps, SetPosition, Recover, SetOutput, BringUp,
-                             RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
+using Request =
+    std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine,
+                 FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll, Hold, Resume,
+                 SetSpeedOverride, SetLimits, SetCurrent, Home, CancelHoming, Enable, Sleep, Reset,
+                 SetMicrosteps, SetPosition, Recover, SetOutput, BringUp, RestorePosition,
+                 NotePosition, Close, AwaitRest, PowerDown>;
 
 /// Whether it may be refused because of the level of a switch: the inputs are read when it is made.
 inline bool readsInputs(const Request& request) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "activity/activities.h"
 #include "activity/context.h"
 #include "channel/channel_config.h"
+#include "driver/tmc_registers.h"
 #include "machine/named_lines.h"
 #include "stepdriver_core/config/axis_config.h"
 
@@ -55,6 +57,15 @@ class RequestContext {
   const std::optional<pulse::Signal> emergency_stop;  ///< the machine's input
   NamedLines named;
   std::vector<SharedCall> awaiting_rest;  ///< answered when every axis is at rest
+
+  /// Currents that are being written to a driver chip.
+  struct CurrentChange {
+    AxisId axis = 0;
+    std::size_t motor = 0;
+    driver::tmc::CurrentScale scale;
+    SharedCall call;
+  };
+  std::map<std::uint64_t, CurrentChange> current_changes;  ///< by their jobs
 
   axis::AxisModel& axis(AxisId id) const { return *context.axes.at(id); }
   /// The axis, and all that share its motors.

@@ -80,7 +80,7 @@ void reportDrivers(const axis::AxisState& state, DiagnosticStatusWrapper& status
     status.add("driver" + of, driver.is_set_up ? "set up" : "not set up");
     status.add("run current" + of + " [A]", roundedText(driver.run_current));
     status.add("hold current" + of + " [A]", roundedText(driver.hold_current));
-    status.add("current scale" + of + " [1/32]", driver.present_scale + 1);
+    status.add("present current" + of + " [A]", roundedText(driver.present_current));
     status.add("temperature" + of, driver.at_least_celsius > 0
                                        ? fmt::format("above {} C", driver.at_least_celsius)
                                        : "below 120 C");
@@ -88,6 +88,8 @@ void reportDrivers(const axis::AxisState& state, DiagnosticStatusWrapper& status
     status.add("open coils" + of, driver.open_load_a   ? driver.open_load_b ? "A and B" : "A"
                                   : driver.open_load_b ? "B"
                                                        : "none");
+    status.add("SG_RESULT" + of,
+               driver.stall_guard ? std::to_string(*driver.stall_guard) : "not measured");
     status.add("register accesses" + of, driver.transactions);
     status.add("register accesses tried again" + of, driver.retries);
   }

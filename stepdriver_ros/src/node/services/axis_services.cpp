@@ -28,6 +28,18 @@ std::string changesText(const axis::AxisLimits& before, const axis::AxisLimits& 
   return text.empty() ? "no limit has changed" : text;
 }
 
+/// "0.795 A in motion, 0.398 A at rest", for each motor if there are several.
+std::string currentsText(const axis::AxisState& state) {
+  std::string text;
+  if (!state.drivers) return text;
+  for (const driver::DriverState& driver : *state.drivers) {
+    text += fmt::format("{}{}{} A in motion, {} A at rest", text.empty() ? "" : "; ",
+                        driver.motor.empty() ? "" : driver.motor + " ",
+                        roundedText(driver.run_current), roundedText(driver.hold_current));
+  }
+  return text;
+}
+
 }  // namespace
 
 template <typename Service>
@@ -46,6 +58,7 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
   advertise<Plan>("plan", &AxisServices::plan, own);
   advertise<Microstep>("microstep", &AxisServices::microstep, own);
   advertise<SetLimits>("set_limits", &AxisServices::setLimits, own);
+  advertise<SetCurrent>("set_current", &AxisServices::setCurrent, own);
   advertise<SetPosition>("set_position", &AxisServices::setPosition, own);
   advertise<std_srvs::SetBool>("enable", &AxisServices::enable, queues.power(index));
   advertise<std_srvs::SetBool>("sleep", &AxisServices::sleep, own);
@@ -172,6 +185,19 @@ bool AxisServices::setLimits(SetLimits::Request& request, SetLimits::Response& r
   response.acceleration = holding.acceleration;
   response.deceleration = holding.deceleration;
   response.jerk = holding.jerk;
+  return true;
+}
+
+bool AxisServices::setCurrent(SetCurrent::Request& request, SetCurrent::Response& response) {
+  respond(response, [&] {
+    axis_.setCurrent(request.run_current, request.hold_current);
+    response.message = axis_.config().name + ": " + currentsText(axis_.state());
+  });
+  const auto drivers = axis_.state().drivers;
+  if (drivers && !drivers->empty()) {
+    response.run_current = drivers->front().run_current;
+    response.hold_current = drivers->front().hold_current;
+  }
   return true;
 }
 

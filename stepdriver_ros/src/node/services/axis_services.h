@@ -8,6 +8,7 @@
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/Plan.h>
+#include <stepdriver/SetCurrent.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
 
@@ -43,6 +44,7 @@ class AxisServices {
   bool plan(Plan::Request& request, Plan::Response& response);
   bool microstep(Microstep::Request& request, Microstep::Response& response);
   bool setLimits(SetLimits::Request& request, SetLimits::Response& response);
+  bool setCurrent(SetCurrent::Request& request, SetCurrent::Response& response);
   bool setPosition(SetPosition::Request& request, SetPosition::Response& response);
   bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool sleep(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);

@@ -56,6 +56,8 @@ StatePublisher::StatePublisher(ros::NodeHandle node, ros::NodeHandle private_nod
     endstops_.name.push_back(axis->config().name);
     own_state_publishers_.push_back(
         private_node.advertise<AxisState>(axis->config().name + "/state", kQueueSize, true));
+    driver_publishers_.emplace_back(ros::NodeHandle(private_node, axis->config().name),
+                                    axis->state());
   }
   const std::size_t axes = machine.axes().size();
   joint_states_.position.resize(axes);
@@ -101,6 +103,7 @@ void StatePublisher::run() {
       const bool due = now >= axis_states_due;
       // At rest nothing is repeated, except the periodic message for subscribers.
       publishStateOfEachAxis(due);
+      publishDrivers();
       publishAxisStates(!due || (!moving && axis_state_publisher_.getNumSubscribers() == 0));
       if (due)
         axis_states_due = nextTime<Clock::time_point>(axis_states_due, kAxisStatePeriod, now);
@@ -111,6 +114,7 @@ void StatePublisher::run() {
   publishJointStates();
   publishEndstopsOnChange();
   publishStateOfEachAxis(true);
+  publishDrivers();
   publishAxisStates(false);
 }
 
@@ -219,6 +223,12 @@ void StatePublisher::publishAxisStates(bool only_on_change) {
     message.position_note.push_back(state.position_note);
   }
   axis_state_publisher_.publish(message);
+}
+
+void StatePublisher::publishDrivers() {
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    driver_publishers_[i].publish(states_[i], states_read_);
+  }
 }
 
 // Call before publishAxisStates(), which then makes these states the known ones.

@@ -13,12 +13,14 @@
 #include <thread>
 #include <vector>
 
+#include "driver_publisher.h"
 #include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 
-/// Publishes joint_states, ~endstops, ~axis_states, each axis's state and ~state from a thread of
-/// its own, so that waiting calls don't slow it down. One thread calls start() and stop().
+/// Publishes joint_states, ~endstops, ~axis_states, each axis's state and driver, and ~state from a
+/// thread of its own, so that waiting calls don't slow it down. One thread calls start() and
+/// stop().
 class StatePublisher {
  public:
   /// @param node, private_node handles of the node, and of its private names.
@@ -47,6 +49,7 @@ class StatePublisher {
   void publishEndstopsOnChange();
   void publishAxisStates(bool only_on_change);
   void publishStateOfEachAxis(bool due);
+  void publishDrivers();
 
   const machine::Machine& machine_;
   const Clock::duration joint_state_period_;
@@ -55,6 +58,7 @@ class StatePublisher {
   ros::Publisher endstop_publisher_;
   ros::Publisher axis_state_publisher_;
   std::vector<ros::Publisher> own_state_publishers_;  // one for each axis
+  std::vector<DriverPublisher> driver_publishers_;    // the same
 
   // For the thread only.
   sensor_msgs::JointState joint_states_;

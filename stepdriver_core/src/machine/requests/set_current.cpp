@@ -1,0 +1,74 @@
+#include "set_current.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "message_text.h"
+
+namespace stepdriver::machine {
+namespace {
+
+struct Wanted {
+  double run = 0.0;
+  double hold = 0.0;
+};
+
+double checkedCurrent(const axis::AxisModel& axis, const char* what, double wanted, double least,
+                      double most, const char* most_is) {
+  if (wanted >= least && wanted <= most) return wanted;
+  axis.refuse(fmt::format("the {} current of {} A must be 0 or from {} to {} A, {}", what,
+                          numberText(wanted), lowerBoundText(least), upperBoundText(most),
+                          most_is));
+}
+
+/// @throw Refused
+Wanted checkedCurrents(const axis::AxisModel& axis, const motor::TmcChip& chip,
+                       const SetCurrent& request) {
+  const config::TmcConfig& config = chip.config();
+  const double least = chip.lowestCurrent();
+  Wanted wanted;
+  wanted.run = request.run == 0.0 ? config.run_current
+                                  : checkedCurrent(axis, "run", request.run, least,
+                                                   config.run_current, "its tmc/run_current_a");
+  wanted.hold = request.hold == 0.0 ? std::min(config.hold_current, wanted.run)
+                                    : checkedCurrent(axis, "hold", request.hold, least, wanted.run,
+                                                     "its run current");
+  return wanted;
+}
+
+}  // namespace
+
+std::string SetCurrent::text(const AxisWords& axes) const {
+  return fmt::format("set currents of {}: run {} A, hold {} A", axes.name(axis), numberText(run),
+                     numberText(hold));
+}
+
+void SetCurrent::serve(RequestContext& machine, const SharedCall& call) const {
+  axis::AxisModel& changed = machine.axis(axis);
+  changed.refuseUnlessOpen();
+  std::vector<RequestContext::CurrentChange> changes;
+  for (std::size_t i = 0; i < changed.motor.chips(); ++i) {
+    const motor::TmcChip* chip = changed.motor.tmcAt(i);
+    if (chip == nullptr) continue;
+    const Wanted wanted = checkedCurrents(changed, *chip, *this);
+    if (!chip->isSetUp()) {
+      changed.refuse(changed.chipText(i) +
+                     " isn't set up: it has no power, or the axis is at fault");
+    }
+    changes.push_back({axis, i, chip->scaleOf(wanted.run, wanted.hold), call});
+  }
+  if (changes.empty()) {
+    changed.refuse("its current is set by the board: it has no driver with `tmc`");
+  }
+  for (RequestContext::CurrentChange& change : changes) {
+    bus::RegisterJob job = changed.motor.tmcAt(change.motor)->setCurrent(change.scale);
+    job.id = machine.context.newJob();
+    machine.context.out->register_jobs.push_back(job);
+    machine.current_changes.emplace(job.id, std::move(change));
+  }
+}
+
+}  // namespace stepdriver::machine

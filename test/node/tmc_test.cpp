@@ -1,0 +1,95 @@
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <stepdriver/DriverState.h>
+#include <stepdriver/Microstep.h>
+#include <stepdriver/SetCurrent.h>
+
+#include <cmath>
+#include <string>
+
+#include "support/node_under_test.h"
+#include "support/recorder.h"
+#include "support/says.h"
+
+// A driver on a UART: its currents and its state, by service, topic and diagnostics.
+
+namespace stepdriver::node_test {
+namespace {
+
+class TmcNode : public testing::Test {
+ protected:
+  TmcNode() {
+    node.set("axes/x/driver", "tmc2209");
+    for (const char* pin : {"ms1", "ms2", "ms3", "sleep", "reset"}) {
+      node.erase(std::string("axes/x/pins/") + pin);
+    }
+    node.set("axes/x/tmc/port", "/dev/serial0");
+    node.set("axes/x/tmc/address", 0);
+    node.set("axes/x/tmc/sense_resistor_mohm", 110.0);
+    node.set("axes/x/tmc/run_current_a", 0.8);
+  }
+
+  SetCurrent::Response setCurrent(double run, double hold) {
+    SetCurrent::Request request;
+    request.run_current = run;
+    request.hold_current = hold;
+    return node.call<SetCurrent>("x/set_current", request);
+  }
+
+  NodeUnderTest node;
+};
+
+TEST_F(TmcNode, MovesAndChangesItsMicrosteps) {
+  node.start();
+  EXPECT_TRUE(node.moveTo(0.02, true).success);
+  Microstep::Request request;
+  request.microsteps = 256;
+  EXPECT_TRUE(node.call<Microstep>("x/microstep", request).success);
+  EXPECT_TRUE(node.moveTo(0.01, true).success);
+  EXPECT_NEAR(node.rig().carriage.at(0), 0.01, 1e-9);
+}
+
+TEST_F(TmcNode, ShowsWhatItsDriverSaysAndTakesAnotherCurrent) {
+  node.start();
+  const Recorder<DriverState> states(node.full("x/driver"));
+  ASSERT_TRUE(states.waitForLatest([](const DriverState& state) {
+    return state.motor.size() == 1 && state.set_up.at(0) && state.accesses.at(0) > 0 &&
+           std::abs(state.run_current.at(0) - 0.795) < 1e-3 && state.retries.at(0) == 0;
+  }));
+  const SetCurrent::Response refused = setCurrent(0.9, 0.0);
+  EXPECT_FALSE(refused.success);
+  expectSays(refused.message, "to 0.8 A, its tmc/run_current_a");
+  EXPECT_NEAR(refused.run_current, 0.795, 1e-3);
+  const SetCurrent::Response response = setCurrent(0.5, 0.1);
+  EXPECT_TRUE(response.success) << response.message;
+  expectSays(response.message, "x: 0.4895");
+  EXPECT_NEAR(response.run_current, 0.4895, 1e-3);
+  EXPECT_TRUE(states.waitForLatest([](const DriverState& state) {
+    return std::abs(state.run_current.at(0) - 0.4895) < 1e-3 &&
+           std::abs(state.hold_current.at(0) - 0.0918) < 1e-3;
+  }));
+  const Recorder<diagnostic_msgs::DiagnosticArray> diagnostics("/diagnostics");
+  EXPECT_TRUE(diagnostics.waitForLatest([&](const diagnostic_msgs::DiagnosticArray& array) {
+    for (const auto& status : array.status) {
+      for (const auto& value : status.values) {
+        if (value.key == "run current [A]") return std::abs(std::stod(value.value) - 0.49) < 0.01;
+      }
+    }
+    return false;
+  }));
+}
+
+TEST_F(TmcNode, HasNoSuchTopicWithoutTmc) {
+  node.erase("axes/x/tmc");
+  node.erase("axes/x/microsteps");
+  node.set("axes/x/microsteps", 16);
+  node.start();
+  expectSays(setCurrent(0.5, 0.1).message, "its current is set by the board");
+  ros::master::V_TopicInfo topics;
+  ASSERT_TRUE(ros::master::getTopics(topics));
+  for (const auto& topic : topics) EXPECT_NE(topic.name, node.full("x/driver"));
+}
+
+}  // namespace
+}  // namespace stepdriver::node_test
