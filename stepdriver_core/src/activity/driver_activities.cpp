@@ -329,6 +329,9 @@ PinsStep::Writes ChangeMicrosteps::writes() {
   writes.scale = pulse::Command::Scale{change.count, axis.takenUpIn(wanted_, axis.takenUp()),
                                        axis.exactBacklash(wanted_)};
   writes.then = [&axis, change, origin] {
+    if (motor::TmcChip* chip = axis.motor.tmcAt(0)) {
+      chip->audit().begin(chip->mscnt(), change.count);
+    }
     axis.motor.translator().changed(change);
     axis.position.rescale(origin);
   };

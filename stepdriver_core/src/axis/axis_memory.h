@@ -1,8 +1,12 @@
 #pragma once
 
+#include <vector>
+
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::axis {
+
+constexpr int kUnknownMscnt = -1;
 
 /// The part of an axis's state that outlives the program; see machine::StateFile.
 struct AxisMemory {
@@ -14,11 +18,15 @@ struct AxisMemory {
   bool homed = false;
   bool at_home = false;  ///< the chip's translator was in its state after a reset
   bool moving = false;
+  /// [1/256 full step] MSCNT of the driver of each motor that has one with registers, of this axis
+  /// and then of those that share its motors; or kUnknownMscnt.
+  std::vector<int> mscnt;
 
   bool operator==(const AxisMemory& other) const {
     return kind == other.kind && steps_per_unit == other.steps_per_unit &&
            position == other.position && slack == other.slack && valid == other.valid &&
-           homed == other.homed && at_home == other.at_home && moving == other.moving;
+           homed == other.homed && at_home == other.at_home && moving == other.moving &&
+           mscnt == other.mscnt;
   }
 };
 

@@ -472,6 +472,39 @@ void AxisModel::rememberRest() {
   rest_.at_home = motor.areAtHome() &&
                   std::all_of(sharers_.begin(), sharers_.end(),
                               [](const AxisModel* sharer) { return sharer->motor.areAtHome(); });
+  rest_.mscnt.clear();
+  forEachTmc([this](const motor::Motor& any, std::size_t i) {
+    rest_.mscnt.push_back(any.mscntOf(i).value_or(kUnknownMscnt));
+  });
+}
+
+void AxisModel::forEachTmc(const std::function<void(const motor::Motor&, std::size_t)>& act) const {
+  const auto each = [&act](const motor::Motor& any) {
+    for (std::size_t i = 0; i < any.chips(); ++i) {
+      if (any.tmcAt(i) != nullptr) act(any, i);
+    }
+  };
+  each(motor);
+  for (const AxisModel* sharer : sharers_) each(sharer->motor);
+}
+
+AxisModel::ChipsSince AxisModel::chipsSince(const AxisMemory& kept) const {
+  ChipsSince since = ChipsSince::kSame;
+  std::size_t number = 0;
+  forEachTmc([&](const motor::Motor& any, std::size_t i) {
+    const motor::TmcChip& chip = *any.tmcAt(i);
+    const int then = number < kept.mscnt.size() ? kept.mscnt[number] : kUnknownMscnt;
+    ++number;
+    if (!chip.isSetUp() || !chip.keptItsPower() || then == kUnknownMscnt) {
+      if (since == ChipsSince::kSame) since = ChipsSince::kUnknown;
+    } else if (then != chip.mscnt()) {
+      since = ChipsSince::kStepped;
+    }
+  });
+  std::size_t motors = config.motors();
+  for (const AxisModel* sharer : sharers_) motors += sharer->config.motors();
+  if (number < motors && since == ChipsSince::kSame) return ChipsSince::kUnknown;
+  return since;
 }
 
 std::string AxisModel::whyImpossible(const AxisMemory& kept, const std::string& source) const {
@@ -507,15 +540,21 @@ std::string AxisModel::whyUnverified(const AxisMemory& kept, bool clean,
         "is not known where it stopped",
         showPlace(kept.position));
   }
-  if (!clean) return "the node that kept this position wasn't shut down";
+  const ChipsSince chips = chipsSince(kept);
+  if (!clean) {
+    const std::string text = "the node that kept this position wasn't shut down";
+    if (chips == ChipsSince::kSame) return text + "; no driver has counted a step since";
+    return chips == ChipsSince::kStepped ? text + ", and a driver has counted steps since" : text;
+  }
+  if (chips == ChipsSince::kStepped) return "a driver has counted steps since it was kept";
   if (!kept.valid) return "the position couldn't be trusted when it was kept";
   if (!config.holds_position_unpowered) {
     return "the motor had no current in between, and holds_position_unpowered isn't set";
   }
-  if (config.stepsOnBothEdges() && countsWhileDisabled()) {
+  if (config.stepsOnBothEdges() && countsWhileDisabled() && chips != ChipsSince::kSame) {
     return "each edge of STEP is a step, and the start may have made one without current";
   }
-  if (!kept.at_home) {
+  if (!kept.at_home && chips != ChipsSince::kSame) {
     return "the chip was reset in between, which may have turned the motor by up to two full steps";
   }
   return "";

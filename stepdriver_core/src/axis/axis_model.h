@@ -235,6 +235,16 @@ class AxisModel {
   /// A chip's translator follows STEP without current.
   bool countsWhileDisabled() const;
 
+  /// What the drivers with registers say of the time since a memory.
+  enum class ChipsSince {
+    kSame,     ///< all of them have kept their power, and have counted no step
+    kStepped,  ///< one has kept its power, and has counted steps
+    kUnknown,
+  };
+  ChipsSince chipsSince(const AxisMemory& kept) const;
+  /// For each driver with registers, of this axis and of those that share its motors.
+  void forEachTmc(const std::function<void(const motor::Motor& any, std::size_t i)>& act) const;
+
   std::vector<AxisModel*> sharing_;  // in the order of the kinematics
   std::vector<AxisModel*> sharers_;  // without itself
   double reach_ = 0.0;

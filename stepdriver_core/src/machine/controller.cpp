@@ -27,6 +27,7 @@ constexpr const char* kPowerRemedy =
 // A fault of a chip with a serial port is known within this time, and that of the wire: a silent
 // chip takes a tenth of a second for its three tries, and up to four share a port.
 constexpr pulse::Nanoseconds kPollPeriod = 250'000'000;
+constexpr pulse::Nanoseconds kAuditPeriod = 1'000'000'000;
 
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
@@ -315,10 +316,18 @@ pulse::Nanoseconds Controller::pollDue(const motor::TmcChip& chip) const {
 }
 
 void Controller::superviseChips(axis::AxisModel& axis) {
+  const auto moves = [](const axis::AxisModel* any) { return any->moving(); };
+  const bool rests = !axis.fault && !axis.moving() &&
+                     std::none_of(axis.sharers().begin(), axis.sharers().end(), moves);
   for (std::size_t i = 0; i < axis.motor.chips(); ++i) {
     motor::TmcChip* chip = axis.motor.tmcAt(i);
-    if (chip == nullptr || context_.now < pollDue(*chip)) continue;
-    bus::RegisterJob job = chip->poll();
+    if (chip == nullptr) continue;
+    if (axis.fault) chip->audit().end();
+    if (!rests) chip->resting_count.reset();
+    if (context_.now < pollDue(*chip)) continue;
+    const bool audits = rests && context_.now >= chip->next_audit;
+    if (audits) chip->resting_count = axis.motor.countOf(i);
+    bus::RegisterJob job = chip->poll(audits);
     job.id = chip->polling = context_.newJob();
     context_.out->register_jobs.push_back(std::move(job));
   }
@@ -343,8 +352,14 @@ void Controller::takePoll(axis::AxisModel& axis, std::size_t motor, const bus::R
   chip.next_poll = context_.now + kPollPeriod;
   // Its supply was switched off meanwhile, or its registers are being written again.
   if (!chip.isSetUp() || !context_.mode.powered) return;
-  const std::string fault = chip.takePoll(done);
+  std::string fault = chip.takePoll(done);
   axis.motor.noteChips();
+  // Without a change meanwhile: of its mode, or by a step that was still on its way.
+  const auto count = std::exchange(chip.resting_count, {});
+  if (fault.empty() && count == axis.motor.countOf(motor)) {
+    chip.next_audit = context_.now + kAuditPeriod;
+    fault = chip.audited(*count, axis.motor.microsteps());
+  }
   if (!fault.empty()) failChip(axis, motor, fault);
 }
 

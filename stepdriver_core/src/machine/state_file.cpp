@@ -14,6 +14,7 @@
 #include <sstream>
 #include <utility>
 
+#include "driver/tmc_registers.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -23,7 +24,8 @@ constexpr const char* kTitle = "stepdriver state 1";
 constexpr const char* kClean = "clean";
 constexpr const char* kRunning = "running";
 constexpr const char* kColumns =
-    "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home moving";
+    "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home moving "
+    "mscnt...";
 
 // Nobody else needs to read or write these files.
 constexpr mode_t kMode = 0600;
@@ -38,9 +40,11 @@ std::string textOf(const KeptState& state) {
   std::string text = fmt::format("{}\n{}\n{}\n", kTitle, state.clean ? kClean : kRunning, kColumns);
   for (const auto& [name, axis] : state.axes) {
     text +=
-        fmt::format("{} {} {:.17g} {:.17g} {:.17g} {:d} {:d} {:d} {:d}\n", name,
+        fmt::format("{} {} {:.17g} {:.17g} {:.17g} {:d} {:d} {:d} {:d}", name,
                     axis.kind == config::Kind::kLinear ? "linear" : "rotary", axis.steps_per_unit,
                     axis.position, axis.slack, axis.valid, axis.homed, axis.at_home, axis.moving);
+    for (const int mscnt : axis.mscnt) text += fmt::format(" {}", mscnt);
+    text += "\n";
   }
   return text;
 }
@@ -150,7 +154,6 @@ void syncDirectory(const std::string& path) {
 axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
   axis::AxisMemory axis;
   std::string kind;
-  std::string rest;
   line.imbue(std::locale::classic());
   line >> name >> kind >> axis.steps_per_unit >> axis.position >> axis.slack >> axis.valid >>
       axis.homed >> axis.at_home;
@@ -158,7 +161,13 @@ axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
   bool whole = !line.fail();
   // Files of earlier versions end here.
   if (!(line >> std::ws).eof()) whole = whole && static_cast<bool>(line >> axis.moving);
-  whole = whole && !(line >> rest) && (kind == "linear" || kind == "rotary");
+  while (whole && !(line >> std::ws).eof()) {
+    int mscnt = 0;
+    whole = static_cast<bool>(line >> mscnt) && mscnt >= axis::kUnknownMscnt &&
+            mscnt < driver::tmc::kMscntPerCycle;
+    axis.mscnt.push_back(mscnt);
+  }
+  whole = whole && (kind == "linear" || kind == "rotary");
   const bool finite = std::isfinite(axis.position) && std::isfinite(axis.slack);
   if (!whole || !finite || !(axis.steps_per_unit > 0.0)) name.clear();
   return axis;

@@ -60,6 +60,9 @@ void Motor::alignTranslator(std::size_t motor) {
   const double microsteps = tmcs_.at(motor)->mscnt() * translators_.at(motor).microsteps();
   const auto index = std::llround(microsteps / driver::tmc::kFinest);
   translators_.at(motor).wentHome(countOf(motor) - index);
+  StepAudit& audit = tmcs_.at(motor)->audit();
+  audit.end();
+  if (tmcs_.at(motor)->standsStill()) audit.begin(tmcs_.at(motor)->mscnt(), countOf(motor));
 }
 
 void Motor::noteChips() {
@@ -75,6 +78,17 @@ void Motor::forgetRegisters() {
     if (chip != nullptr) chip->forget();
   }
   noteChips();
+}
+
+std::optional<int> Motor::mscntOf(std::size_t motor) const {
+  const auto& chip = tmcs_.at(motor);
+  if (chip == nullptr) return {};
+  return chip->audit().mscntAt(countOf(motor), translators_.at(motor).microsteps());
+}
+
+bool Motor::isAtHome(std::size_t motor) const {
+  if (tmcs_.at(motor) != nullptr) return mscntOf(motor) == 0;
+  return translators_.at(motor).isAtHome(countOf(motor));
 }
 
 bool Motor::areAtHome() const {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "brake.h"
@@ -64,7 +65,7 @@ class Motor {
   Translator& translator() { return translators_.front(); }
   const Translator& translator() const { return translators_.front(); }
   int microsteps() const { return translators_.front().microsteps(); }
-  bool isAtHome(std::size_t motor) const { return translators_.at(motor).isAtHome(countOf(motor)); }
+  bool isAtHome(std::size_t motor) const;
   /// Whether each translator is at Home.
   bool areAtHome() const;
   /// That of a motor has gone Home.
@@ -84,6 +85,9 @@ class Motor {
     return driver_states_;
   }
   void noteChips();
+  /// [1/256 full step] MSCNT of the chip of a motor at its present count; empty: it isn't known, or
+  /// there is no such chip.
+  std::optional<int> mscntOf(std::size_t motor) const;
   /// All of them have lost their registers.
   void forgetRegisters();
   /// @}

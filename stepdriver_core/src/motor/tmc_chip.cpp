@@ -26,6 +26,9 @@ constexpr const char* kHeatRemedy =
     "let it cool down, lower tmc/run_current_a or cool the chip, then call recover";
 constexpr const char* kShortRemedy =
     "switch the power off and check the motor's wires, then call recover";
+constexpr const char* kAuditRemedy =
+    "check the wires to STEP and DIR and their ground, then call recover, and home the axis or set "
+    "its position";
 constexpr const char* kSupplyRemedy = "check the motor supply, then call recover";
 
 bool is2208(const config::MotorConfig& motor) { return motor.driver.name == "tmc2208"; }
@@ -99,6 +102,7 @@ bus::RegisterJob TmcChip::setUp(int microsteps, const std::vector<int>& port_add
     all.push_back({value.reads_back ? Kind::kWriteBack : Kind::kWrite, address, value.number,
                    value.value, 0});
   }
+  all.push_back(read(tmc::kGstat));
   all.push_back({Kind::kWrite, address, tmc::kGstat, tmc::kGstatAll, 0});
   all.push_back(read(tmc::kMscnt));
   all.push_back(read(tmc::kGstat));
@@ -116,13 +120,14 @@ bus::RegisterJob TmcChip::changeMode(int microsteps) const {
        read(tmc::kMscnt)});
 }
 
-bus::RegisterJob TmcChip::poll() const {
+bus::RegisterJob TmcChip::poll(bool audits) const {
   Accesses all{read(tmc::kGstat), read(tmc::kDrvStatus, tmc::kVolatileStatus)};
   if (settings_.has_stall_guard) {
     bus::RegisterAccess load = read(tmc::kSgResult);
     load.kind = Kind::kSample;
     all.push_back(load);
   }
+  if (audits) all.push_back(read(tmc::kMscnt));
   return jobOf(std::move(all));
 }
 
@@ -163,6 +168,7 @@ std::string TmcChip::takeSetUp(const bus::RegisterDone& done) {
                        done.found >> kVersionShift);
   }
   if (done.failure != bus::Failure::kNone) return failureText(done);
+  kept_power_ = (done.values[done.values.size() - 5] & tmc::kGstatReset) == 0;
   mscnt_ = static_cast<int>(done.values[done.values.size() - 3]);
   const std::uint32_t gstat = done.values[done.values.size() - 2];
   const std::uint32_t status = done.values.back();
@@ -175,6 +181,7 @@ std::string TmcChip::takeSetUp(const bus::RegisterDone& done) {
 std::string TmcChip::takeMode(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
+  mscnt_ = static_cast<int>(done.values.back());
   if (done.values.front() == done.values.back()) return "";
   state_.is_set_up = false;
   remedy_ = kWireRemedy;
@@ -191,6 +198,7 @@ std::string TmcChip::takePoll(const bus::RegisterDone& done) {
   if (settings_.has_stall_guard && (status & tmc::kStandstill) == 0) {
     state_.stall_guard = static_cast<int>(done.values.at(2));
   }
+  mscnt_ = static_cast<int>(done.values.back());  // if it was asked for
   return faultOf(done.values.front(), status);
 }
 
@@ -202,8 +210,15 @@ std::string TmcChip::takeCurrent(const tmc::CurrentScale& scale, const bus::Regi
   return "";
 }
 
+std::string TmcChip::audited(std::int64_t count, int microsteps) {
+  if (!stands_still_) return "";
+  remedy_ = kAuditRemedy;
+  return audit_.check(mscnt_, count, microsteps);
+}
+
 void TmcChip::takeStatus(std::uint32_t status) {
   const auto has = [status](std::uint32_t bit) { return (status & bit) != 0; };
+  stands_still_ = has(tmc::kStandstill);
   state_.present_current =
       currentOf(static_cast<int>((status & tmc::kPresentScale) >> tmc::kPresentScaleShift));
   state_.stealth_chop = has(tmc::kStealthChop);

@@ -7,6 +7,7 @@
 
 #include "bus/register_job.h"
 #include "driver/tmc_registers.h"
+#include "step_audit.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/driver/driver_state.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -30,8 +31,8 @@ class TmcChip {
   /// Another microstep mode. MSCNT is read before and after: the place in the electrical cycle must
   /// stay.
   bus::RegisterJob changeMode(int microsteps) const;
-  /// What the chip says of itself.
-  bus::RegisterJob poll() const;
+  /// What the chip says of itself. @param audits MSCNT, too.
+  bus::RegisterJob poll(bool audits = false) const;
   /// The scale of currents [A rms] in the range that is configured.
   driver::tmc::CurrentScale scaleOf(double run, double hold) const;
   /// [A rms] The lowest current in that range.
@@ -50,7 +51,7 @@ class TmcChip {
   ///   currents aren't changed; empty if they are.
   std::string takeCurrent(const driver::tmc::CurrentScale& scale, const bus::RegisterDone& done);
 
-  /// [1/256 full step] Its place in the electrical cycle when it was set up.
+  /// [1/256 full step] Its place in the electrical cycle when it was set up, or audited last.
   int mscnt() const { return mscnt_; }
   /// All its registers are as they must be, as far as it is known.
   bool isSetUp() const { return state_.is_set_up; }
@@ -60,10 +61,24 @@ class TmcChip {
   /// The remedy for the fault that takeSetUp(), takeMode() or takePoll() said last.
   const std::string& remedy() const { return remedy_; }
 
+  /// Compares the MSCNT of the last takePoll() with the count at which the motor has been at rest
+  /// since the poll. @return a fault, as takePoll().
+  std::string audited(std::int64_t count, int microsteps);
+  StepAudit& audit() { return audit_; }
+  const StepAudit& audit() const { return audit_; }
+  /// It hadn't been reset when it was set up: it has counted the steps since its last start,
+  /// whoever sent them.
+  bool keptItsPower() const { return kept_power_; }
+  /// It stood still when it was asked last.
+  bool standsStill() const { return stands_still_; }
+
   /// @name The poll under way, which the controller asks for
   /// @{
   std::uint64_t polling = 0;  ///< its job; 0: none
+  /// The count of the motor, if MSCNT is asked for and the motor has been at rest since.
+  std::optional<std::int64_t> resting_count;
   pulse::Nanoseconds next_poll = 0;
+  pulse::Nanoseconds next_audit = 0;
   /// @}
 
  private:
@@ -85,6 +100,9 @@ class TmcChip {
   driver::DriverState state_;
   std::string remedy_;
   int mscnt_ = 0;
+  bool stands_still_ = false;
+  bool kept_power_ = false;
+  StepAudit audit_;
 };
 
 }  // namespace stepdriver::motor

@@ -142,8 +142,19 @@ std::optional<ChipModel::Pulse> ChipModel::onStep(Pin pin, std::int64_t time_ns)
   last_step_ = pin;
 
   Pulse pulse{isCwCcw() ? pin == Pin::kStep : at(Pin::kDir).level, 0};
-  if (counts()) pulse.moved = advance(pulse.forward);
+  for (int i = heard(); i > 0 && counts(); --i) pulse.moved += advance(pulse.forward);
   return pulse;
+}
+
+// How often it counts a pulse.
+int ChipModel::heard() {
+  if (missed_ > 0) {
+    --missed_;
+    return 0;
+  }
+  if (doubled_ == 0) return 1;
+  --doubled_;
+  return 2;
 }
 
 void ChipModel::checkGap(Pin pin, std::int64_t time_ns) {

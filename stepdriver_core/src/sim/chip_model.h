@@ -54,6 +54,11 @@ class ChipModel {
   }
   /// Its power was off, and is there again.
   void powerUp();
+  /// It misses so many of the next pulses, then counts so many twice.
+  void mishear(int missed, int doubled) {
+    missed_ = missed;
+    doubled_ = doubled;
+  }
   bool inReset() const { return chip_.reset_held && at(Pin::kReset).level == *chip_.reset_held; }
   std::int64_t translator() const { return translator_; }
   int microsteps() const { return microsteps_; }
@@ -92,6 +97,7 @@ class ChipModel {
   void checkReadiness(std::int64_t time_ns);
   void onMode(std::int64_t time_ns);
   std::int64_t advance(bool forward);
+  int heard();
   void goHomeIfHeld();
 
   const driver::DriverChip chip_;
@@ -108,6 +114,8 @@ class ChipModel {
   bool by_registers_ = false;
   bool outputs_on_ = true;
   int microsteps_;
+  int missed_ = 0;
+  int doubled_ = 0;
   std::map<Violation, std::int64_t> violations_;
 };
 

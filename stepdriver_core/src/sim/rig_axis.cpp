@@ -312,6 +312,7 @@ void RigAxis::noteMoved(std::int64_t time_ns) {
 void RigAxis::setFaults(const RigFaults& faults, std::int64_t time_ns) {
   advance(time_ns);
   faults_ = faults;
+  chip_.mishear(faults.missed_pulses, faults.doubled_pulses);
   motor_steps_ = 0;
   if (min_switch_) min_switch_->stick(faults.min_stuck);
   if (max_switch_) max_switch_->stick(faults.max_stuck);

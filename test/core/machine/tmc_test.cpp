@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "bus/serial_port.h"
@@ -102,7 +103,6 @@ TEST(TmcDrivers, KeepTheirCurrentAtRecoverIfTheyHaveNoFault) {
   const config::AxisConfig twin = tmcAxis("right", 1);
   config.twins.push_back(static_cast<const config::MotorConfig&>(twin));
   config.twins.front().motor = "right";
-  config.max_skew = 0.006;
   Bench bench({config}, test::rigMotors(config));
   const auto drivers = [&bench] { return *bench.axis("y").state().drivers; };
   bench.machine->advance(0.1);
@@ -208,6 +208,81 @@ TEST(TmcDrivers, AreAtFaultIfTheyDoNotTakeACurrent) {
   bench.rig.setWireFaults(kPort, faults);
   EXPECT_PRED2(has, failureOf([&] { bench.axis().setCurrent(0.5, 0.1); }), "damaged");
   EXPECT_PRED2(has, bench.axis().state().fault, "damaged");
+}
+
+// A hundred thousand pulses, and one that the chip hasn't heard, or has heard twice.
+class AuditOfSteps : public ::testing::TestWithParam<std::tuple<bool, bool, bool>> {};
+
+TEST_P(AuditOfSteps, FindsOneInAHundredThousand) {
+  const auto [doubled, inverted, on_the_way_back] = GetParam();
+  config::AxisConfig config = tmcAxis();
+  config.pins.dir.inverted = inverted;
+  Bench bench({config});
+  axis::Axis& x = bench.axis();
+  x.setPosition(0.0);
+  constexpr int kWays = 26;  // of 4008 pulses
+  for (int way = 0; way < kWays; ++way) {
+    ASSERT_EQ(x.state().fault, "") << "after " << way << " ways";
+    ASSERT_TRUE(x.state().position_valid);
+    if (way == kWays - (on_the_way_back ? 1 : 2)) {
+      sim::RigFaults faults;
+      (doubled ? faults.doubled_pulses : faults.missed_pulses) = 1;
+      bench.rig.setFaults("x", faults);
+    }
+    x.wait(x.moveTo(way % 2 == 0 ? 0.0501 : 0.0));
+    if (way == 0) bench.machine->advance(1.5);  // the audit learns in which direction it counts
+  }
+  EXPECT_GE(bench.pulses(), 100'000);
+  bench.machine->advance(1.5);
+  // The way on which it happened led forward, or back.
+  EXPECT_PRED2(has, x.state().fault,
+               doubled != on_the_way_back
+                   ? "the TMC2209 is 1 step ahead of the pulses that were sent"
+                   : "the TMC2209 is 1 step behind the pulses that were sent");
+  EXPECT_PRED2(has, x.state().remedy, "check the wires to STEP and DIR");
+  EXPECT_FALSE(x.state().position_valid);
+  bench.machine->recover();
+  EXPECT_EQ(x.state().fault, "");
+  bench.move(0.01);
+  bench.machine->advance(2.0);
+  EXPECT_EQ(x.state().fault, "");
+}
+
+std::string nameOfAudit(const ::testing::TestParamInfo<AuditOfSteps::ParamType>& info) {
+  const auto [doubled, inverted, on_the_way_back] = info.param;
+  return std::string(doubled ? "OneExtra" : "OneLost") + (inverted ? "Inverted" : "") +
+         (on_the_way_back ? "AtTheEnd" : "Before");
+}
+
+INSTANTIATE_TEST_SUITE_P(, AuditOfSteps,
+                         ::testing::Combine(::testing::Bool(), ::testing::Bool(),
+                                            ::testing::Bool()),
+                         nameOfAudit);
+
+TEST(TmcDrivers, AreAuditedInEachModeWhilePinsAndCurrentsChange) {
+  Bench bench({tmcAxis("x", 0), tmcAxis("y", 1)});
+  axis::Axis& x = bench.axis();
+  x.setPosition(0.0);
+  for (const int microsteps : {256, 1, 32, 4, 16}) {
+    SCOPED_TRACE(microsteps);
+    x.setMicrosteps(microsteps);
+    bench.machine->advance(1.3);
+    x.wait(x.moveTo(0.003));
+    bench.machine->advance(1.3);
+    x.enable(false);
+    bench.machine->advance(1.3);
+    x.enable(true);
+    x.wait(x.moveTo(0.0));
+    bench.machine->advance(1.3);
+    EXPECT_EQ(x.state().fault, "");
+  }
+  sim::RigFaults faults;
+  faults.missed_pulses = 3;
+  bench.rig.setFaults("x", faults);
+  x.wait(x.moveTo(0.003));
+  bench.machine->advance(1.3);
+  EXPECT_PRED2(has, x.state().fault, "is 3 steps behind the pulses that were sent");
+  EXPECT_EQ(bench.axis("y").state().fault, "");
 }
 
 struct Trouble {

@@ -255,6 +255,10 @@ struct RigFaults {
   std::optional<std::int64_t> chip_fault_after;
   /// How long its cause lasts, for a chip whose fault ends by itself; 0: for ever.
   std::int64_t chip_fault_lasts_ns = 0;
+  /// The driver chip misses so many of the next pulses on STEP, and counts so many of the next ones
+  /// twice, as with a bad wire.
+  int missed_pulses = 0;
+  int doubled_pulses = 0;
   bool never_in_position = false;  ///< the in-position output stays inactive
 };
 
