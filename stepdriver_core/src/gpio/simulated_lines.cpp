@@ -14,8 +14,13 @@ namespace stepdriver::gpio {
 // NOLINTNEXTLINE(performance-unnecessary-value-param): a board that knows its edges keeps it
 void Board::watchInput(int /*line*/, EdgeListener /*listener*/) {}
 
-// NOLINTNEXTLINE(performance-unnecessary-value-param): a board with serial ports keeps it
-void Board::setTimeSource(std::function<std::int64_t()> /*now*/) {}
+bool Board::hasSerial(const std::string& /*port*/) const { return false; }
+
+std::vector<std::uint8_t> Board::onBytes(const std::string& /*port*/, const std::uint8_t* /*bytes*/,
+                                         std::size_t /*count*/, bool /*pause*/,
+                                         std::int64_t /*time_ns*/) {
+  return {};
+}
 
 struct SimulatedBackend::Shared {
   Shared(Board& wired_board, TimeSource time_source)
@@ -140,14 +145,16 @@ class SimulatedBackend::HeldLines : public Lines {
 };
 
 SimulatedBackend::SimulatedBackend(Board& board, TimeSource now)
-    : shared_(std::make_shared<Shared>(board, now)) {
-  board.setTimeSource(std::move(now));
-}
+    : shared_(std::make_shared<Shared>(board, std::move(now))) {}
 
-SimulatedBackend::~SimulatedBackend() { shared_->board.setTimeSource({}); }
+SimulatedBackend::~SimulatedBackend() = default;
 
-std::string SimulatedBackend::serialDevice(const std::string& port) {
-  return shared_->board.serialDevice(port);
+Backend::SerialExchange SimulatedBackend::simulatedSerial(const std::string& port) {
+  if (!shared_->board.hasSerial(port)) return {};
+  return [shared = shared_, port](const std::uint8_t* bytes, std::size_t count, bool pause) {
+    const std::lock_guard<std::mutex> lock(shared->mutex);
+    return shared->board.onBytes(port, bytes, count, pause, shared->now());
+  };
 }
 
 std::unique_ptr<Lines> SimulatedBackend::request(const std::vector<OutputRequest>& outputs,

@@ -6,13 +6,13 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <utility>
 
 #include "bus/serial_port.h"
+#include "bus/simulated_port.h"
 #include "controller.h"
 #include "flight_recorder.h"
 #include "give_way.h"
@@ -47,17 +47,13 @@ constexpr double kKept = 0.5;
 constexpr double kShortestTimeout = 0.005;
 constexpr double kLongestTimeout = 60.0;
 
-/// The devices behind the serial ports of the drivers.
-std::map<std::string, std::string> devicesOf(const std::vector<config::AxisConfig>& axes,
-                                             gpio::Backend& backend) {
-  std::map<std::string, std::string> devices;
-  for (const config::AxisConfig& axis : axes) {
-    for (std::size_t i = 0; i < axis.motors(); ++i) {
-      const auto& tmc = axis.motorAt(i).tmc;
-      if (tmc) devices.emplace(tmc->port, backend.serialDevice(tmc->port));
-    }
+/// Opens a serial port of the computer, or of the simulated board.
+std::unique_ptr<bus::ByteStream> openPort(gpio::Backend& backend, const std::string& port,
+                                          int baud) {
+  if (auto exchange = backend.simulatedSerial(port)) {
+    return std::make_unique<bus::SimulatedPort>(std::move(exchange));
   }
-  return devices;
+  return std::make_unique<bus::SerialPort>(port, baud);
 }
 
 }  // namespace
@@ -112,9 +108,8 @@ class Machine::Impl {
       if (on_io_) on_io_(states);
     };
     shell_options.recorder = recorder_.get();
-    shell_options.open_port = [devices = devicesOf(configs, backend)](const std::string& port,
-                                                                      int baud) {
-      return std::make_unique<bus::SerialPort>(devices.at(port), baud);
+    shell_options.open_port = [&backend](const std::string& port, int baud) {
+      return openPort(backend, port, baud);
     };
     shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring, shell_options);
     for (std::size_t i = 0; i < configs.size(); ++i) {

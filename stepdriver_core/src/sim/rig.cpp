@@ -14,7 +14,6 @@
 
 #include "power_relay.h"
 #include "rig_axis.h"
-#include "serial_terminals.h"
 #include "stepdriver_core/error.h"
 #include "trace_feed.h"
 #include "uart_wire.h"
@@ -186,27 +185,13 @@ class Rig::Impl {
   std::vector<int> watched;           // those of them with a listener
   std::atomic<int> failing_lines{0};  // those with a write_fault: each write asks
   std::int64_t latest_ns = kForEver;
-  std::function<std::int64_t()> time_source;   // empty: the rig's latest time counts
-  std::map<std::string, UartWire> wires;       // by port
-  std::unique_ptr<SerialTerminals> terminals;  // its thread ends before the rest goes
+  std::map<std::string, UartWire> wires;  // by port
 
  private:
-  // The clock may ask the rig: it isn't asked with the rig's mutex.
-  std::int64_t timeOfBytes() {
-    std::function<std::int64_t()> now;
-    {
-      const std::lock_guard<std::mutex> lock(mutex);
-      now = time_source;
-    }
-    return now ? now() : kForEver;
-  }
-
   void connectSerial() {
-    std::vector<std::string> ports;
     for (const auto& axis : axes) {
       if (!axis->hasSerial()) continue;
       const TmcSpec& spec = *axis->spec().tmc;
-      ports.push_back(spec.port);
       UartWire::Chip chip;
       chip.address = spec.address;
       chip.has_power = [this, &own = *axis] { return own.serialHasPower(latest_ns); };
@@ -216,19 +201,6 @@ class Rig::Impl {
       };
       wires[spec.port].add(std::move(chip));
     }
-    if (ports.empty()) return;
-    terminals = std::make_unique<SerialTerminals>(
-        ports,
-        [this](const std::string& port, const std::uint8_t* bytes, std::size_t count, bool pause) {
-          const std::int64_t now_ns = timeOfBytes();
-          const std::lock_guard<std::mutex> lock(mutex);
-          advance(now_ns);
-          UartWire& wire = wires.at(port);
-          if (pause) wire.pause();
-          std::vector<std::uint8_t> heard = wire.send(bytes, count);
-          switchesMoved(latest_ns);
-          return heard;
-        });
   }
 
   void couple(const RigCoupling& coupling) const {
@@ -410,13 +382,17 @@ std::uint32_t Rig::registerOf(const std::string& axis, int number) const {
   return impl_->serialAxisOf(axis).writtenRegister(number);
 }
 
-void Rig::setTimeSource(std::function<std::int64_t()> now) {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
-  impl_->time_source = std::move(now);
-}
+bool Rig::hasSerial(const std::string& port) const { return impl_->wires.count(port) != 0; }
 
-std::string Rig::serialDevice(const std::string& port) {
-  return impl_->terminals != nullptr ? impl_->terminals->pathOf(port) : port;
+std::vector<std::uint8_t> Rig::onBytes(const std::string& port, const std::uint8_t* bytes,
+                                       std::size_t count, bool pause, std::int64_t time_ns) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->advance(time_ns);
+  UartWire& wire = impl_->wires.at(port);
+  if (pause) wire.pause();
+  std::vector<std::uint8_t> heard = wire.send(bytes, count);
+  impl_->switchesMoved(impl_->latest_ns);
+  return heard;
 }
 
 void Rig::clockStalled() {

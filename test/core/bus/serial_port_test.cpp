@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bus/bus_threads.h"
-#include "sim/serial_terminals.h"
+#include "support/serial_terminals.h"
 
 namespace stepdriver::bus {
 namespace {
@@ -39,7 +39,7 @@ class Counter {
   std::string path() const { return terminals_.pathOf("port"); }
 
  private:
-  sim::SerialTerminals terminals_{
+  test::SerialTerminals terminals_{
       {"port"}, [](const std::string&, const std::uint8_t* bytes, std::size_t count, bool) {
         std::vector<std::uint8_t> next(bytes, bytes + count);
         for (std::uint8_t& byte : next) ++byte;

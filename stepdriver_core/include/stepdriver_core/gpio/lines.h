@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -100,9 +101,13 @@ class Backend {
   virtual std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
                                          const std::vector<InputRequest>& inputs) = 0;
 
-  /// The path of the device that is behind a configured serial port: that path itself, unless the
-  /// lines are simulated.
-  virtual std::string serialDevice(const std::string& port) { return port; }
+  /// Sends bytes to a serial port that is simulated, with or without a pause since the last ones,
+  /// and returns what is heard at once. For one thread at a time.
+  using SerialExchange = std::function<std::vector<std::uint8_t>(const std::uint8_t* bytes,
+                                                                 std::size_t count, bool pause)>;
+
+  /// @return empty: the port is a device of this computer. Otherwise the backend outlives it.
+  virtual SerialExchange simulatedSerial(const std::string& /*port*/) { return {}; }
 };
 
 }  // namespace stepdriver::gpio

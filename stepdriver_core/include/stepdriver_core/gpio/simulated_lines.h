@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -49,13 +50,13 @@ class Board {
   /// its inputs change needn't override this: waiting for edges then ends with the timeout.
   virtual void watchInput(int line, EdgeListener listener);
 
-  /// The clock that stamps the edges: a board with serial ports asks it when bytes come. The
-  /// backend calls this once; a board without such ports needn't override it.
-  virtual void setTimeSource(std::function<std::int64_t()> now);
+  /// Whether a serial port leads to the board.
+  virtual bool hasSerial(const std::string& port) const;
 
-  /// The path of the terminal that the board has behind a serial port; the port itself if it has
-  /// none.
-  virtual std::string serialDevice(const std::string& port) { return port; }
+  /// A program has sent bytes to such a port. @param pause the wire was idle before.
+  /// @return what it hears then: its own bytes, and the answers.
+  virtual std::vector<std::uint8_t> onBytes(const std::string& port, const std::uint8_t* bytes,
+                                            std::size_t count, bool pause, std::int64_t time_ns);
 };
 
 /// Simulated lines, with a Board wired to them. Every name is a line, and each can be held once.
@@ -75,7 +76,7 @@ class SimulatedBackend : public Backend {
   /// @throw GpioError if a line is named twice or is held by an earlier request (EBUSY).
   std::unique_ptr<Lines> request(const std::vector<OutputRequest>& outputs,
                                  const std::vector<InputRequest>& inputs) override;
-  std::string serialDevice(const std::string& port) override;
+  SerialExchange simulatedSerial(const std::string& port) override;
 
  private:
   struct Shared;

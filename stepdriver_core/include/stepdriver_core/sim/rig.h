@@ -351,9 +351,9 @@ class Rig : public gpio::Board {
   void setWireFaults(const std::string& port, const WireFaults& faults);
   /// What was written last to a register of the chip, whether it can be read or not.
   std::uint32_t registerOf(const std::string& axis, int number) const;
-  void setTimeSource(std::function<std::int64_t()> now) override;
-  /// The path of the terminal with the chips of a port; the port itself if no chip has it.
-  std::string serialDevice(const std::string& port) override;
+  bool hasSerial(const std::string& port) const override;
+  std::vector<std::uint8_t> onBytes(const std::string& port, const std::uint8_t* bytes,
+                                    std::size_t count, bool pause, std::int64_t time_ns) override;
   /// @}
 
   /// Makes the trace readable up to its last edge while the rig lives.
