@@ -11,8 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "bus/serial_port.h"
-#include "bus/simulated_port.h"
+#include "bus/open_port.h"
 #include "controller.h"
 #include "flight_recorder.h"
 #include "give_way.h"
@@ -46,15 +45,6 @@ constexpr double kKept = 0.5;
 // [s] The bounds of the timeout of setpoints.
 constexpr double kShortestTimeout = 0.005;
 constexpr double kLongestTimeout = 60.0;
-
-/// Opens a serial port of the computer, or of the simulated board.
-std::unique_ptr<bus::ByteStream> openPort(gpio::Backend& backend, const std::string& port,
-                                          int baud) {
-  if (auto exchange = backend.simulatedSerial(port)) {
-    return std::make_unique<bus::SimulatedPort>(std::move(exchange));
-  }
-  return std::make_unique<bus::SerialPort>(port, baud);
-}
 
 }  // namespace
 
@@ -109,7 +99,7 @@ class Machine::Impl {
     };
     shell_options.recorder = recorder_.get();
     shell_options.open_port = [&backend](const std::string& port, int baud) {
-      return openPort(backend, port, baud);
+      return bus::openPort(port, baud, backend.simulatedSerial(port));
     };
     shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring, shell_options);
     for (std::size_t i = 0; i < configs.size(); ++i) {

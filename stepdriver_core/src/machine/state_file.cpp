@@ -25,7 +25,10 @@ constexpr const char* kClean = "clean";
 constexpr const char* kRunning = "running";
 constexpr const char* kColumns =
     "# axis kind steps_per_unit position backlash_taken_up valid homed translator_at_home moving "
-    "mscnt...";
+    "@mscnt...";
+
+// Before each MSCNT, which axes of drivers without registers don't have.
+constexpr char kMscntMark = '@';
 
 // Nobody else needs to read or write these files.
 constexpr mode_t kMode = 0600;
@@ -43,7 +46,7 @@ std::string textOf(const KeptState& state) {
         fmt::format("{} {} {:.17g} {:.17g} {:.17g} {:d} {:d} {:d} {:d}", name,
                     axis.kind == config::Kind::kLinear ? "linear" : "rotary", axis.steps_per_unit,
                     axis.position, axis.slack, axis.valid, axis.homed, axis.at_home, axis.moving);
-    for (const int mscnt : axis.mscnt) text += fmt::format(" {}", mscnt);
+    for (const int mscnt : axis.mscnt) text += fmt::format(" {}{}", kMscntMark, mscnt);
     text += "\n";
   }
   return text;
@@ -162,8 +165,9 @@ axis::AxisMemory axisOf(std::istringstream& line, std::string& name) {
   // Files of earlier versions end here.
   if (!(line >> std::ws).eof()) whole = whole && static_cast<bool>(line >> axis.moving);
   while (whole && !(line >> std::ws).eof()) {
+    char mark = 0;
     int mscnt = 0;
-    whole = static_cast<bool>(line >> mscnt) && mscnt >= axis::kUnknownMscnt &&
+    whole = line >> mark >> mscnt && mark == kMscntMark && mscnt >= axis::kUnknownMscnt &&
             mscnt < driver::tmc::kMscntPerCycle;
     axis.mscnt.push_back(mscnt);
   }

@@ -52,6 +52,7 @@ ChipModel::ChipModel(const RigAxisSpec& spec)
       finest_(finestOf(spec)),
       declared_microsteps_(spec.microsteps),
       decodes_(!chip_.modes.empty() && wiresModePins(spec)),
+      both_edges_(chip_.both_edges),
       microsteps_(spec.microsteps) {
   const driver::ModeCode straps =
       driver::codeOf(chip_, spec.microsteps).value_or(driver::ModeCode{});
@@ -131,7 +132,7 @@ void ChipModel::checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int6
 }
 
 std::optional<ChipModel::Pulse> ChipModel::onStep(Pin pin, std::int64_t time_ns) {
-  if (at(pin).level != chip_.step_active && !chip_.both_edges) {
+  if (at(pin).level != chip_.step_active && !both_edges_) {
     checkTime(step_active_ns_, time_ns, chip_.timing.step_high_ns, Violation::kShortStepHigh);
     step_inactive_ns_ = time_ns;
     return std::nullopt;
@@ -158,7 +159,7 @@ int ChipModel::heard() {
 }
 
 void ChipModel::checkGap(Pin pin, std::int64_t time_ns) {
-  if (!chip_.both_edges) {
+  if (!both_edges_) {
     return checkTime(step_inactive_ns_, time_ns, chip_.timing.step_low_ns,
                      Violation::kShortStepLow);
   }
@@ -208,14 +209,15 @@ void ChipModel::checkReadiness(std::int64_t time_ns) {
   }
 }
 
-void ChipModel::configure(int microsteps, bool outputs_on, std::int64_t time_ns) {
-  if (by_registers_ && decoded_ != microsteps) {
+void ChipModel::configure(const Configured& registers, std::int64_t time_ns) {
+  if (by_registers_ && decoded_ != registers.microsteps) {
     mode_changed_ns_ = time_ns;
     checkTime(step_active_ns_, time_ns, chip_.timing.mode_hold_ns, Violation::kModeHold);
   }
   by_registers_ = true;
-  decoded_ = microsteps;
-  outputs_on_ = outputs_on;
+  decoded_ = registers.microsteps;
+  outputs_on_ = registers.outputs_on;
+  both_edges_ = registers.both_edges;
 }
 
 void ChipModel::onMode(std::int64_t time_ns) {

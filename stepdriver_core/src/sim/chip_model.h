@@ -45,8 +45,13 @@ class ChipModel {
   /// The level of a pin as the chip sees it.
   bool level(Pin pin) const { return at(pin).level; }
   bool energized() const { return enabled() && awake() && !inReset() && outputs_on_; }
-  /// Registers, and not pins, select the microsteps from now on, and switch the outputs.
-  void configure(int microsteps, bool outputs_on, std::int64_t time_ns);
+  /// What registers, and not pins, say from now on.
+  struct Configured {
+    int microsteps = 1;
+    bool outputs_on = false;
+    bool both_edges = false;  ///< of STEP are steps
+  };
+  void configure(const Configured& registers, std::int64_t time_ns);
   /// What ends a latched fault has happened.
   bool endsFault() const {
     if (chip_.fault_end == driver::FaultEnd::kReset) return inReset();
@@ -113,6 +118,7 @@ class ChipModel {
   std::optional<int> decoded_;  // mode selected by the microstep pins, or by registers
   bool by_registers_ = false;
   bool outputs_on_ = true;
+  bool both_edges_;
   int microsteps_;
   int missed_ = 0;
   int doubled_ = 0;

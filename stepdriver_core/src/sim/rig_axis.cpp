@@ -66,7 +66,7 @@ RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
   if (spec_.spring) mass_.emplace(spec_.spring->frequency, spec_.spring->damping, spec_.start);
   if (spec_.tmc) {
     tmc_.emplace(*spec_.tmc);
-    chip_.configure(tmc_->microsteps(), tmc_->outputsOn(), kForEver);
+    chip_.configure(tmc_->configured(), kForEver);
     energized_ = chip_.energized();
   }
   settle(kForEver);
@@ -149,7 +149,7 @@ void RigAxis::meetPower(std::int64_t time_ns) {
   chip_.powerUp();
   if (tmc_) {
     tmc_->reset();
-    chip_.configure(tmc_->microsteps(), tmc_->outputsOn(), time_ns);
+    chip_.configure(tmc_->configured(), time_ns);
   }
   if (spec_.chip.fault_end != driver::FaultEnd::kItself) mendChip();
   energized_ = isEnergizedAt(time_ns);
@@ -344,6 +344,7 @@ std::uint32_t RigAxis::readRegister(int number, std::int64_t time_ns) const {
   senses.dir = chip_.level(Pin::kDir);
   senses.diag = chip_fault_;
   senses.outputs_failed = chip_fault_;
+  senses.lag = swing_ ? swing_->lag() : 0.0;
   const std::int64_t cycle = chip_.cycle();
   senses.mscnt = static_cast<int>((chip_.translator() % cycle + cycle) % cycle);
   senses.standstill = last_pulse_ns_ == kForEver || time_ns - last_pulse_ns_ >= kStandstillNs;
@@ -357,7 +358,8 @@ void RigAxis::writeRegister(int number, std::uint32_t value, std::int64_t time_n
 }
 
 void RigAxis::takeRegisters(std::int64_t time_ns) {
-  chip_.configure(tmc_->microsteps(), tmc_->outputsOn(), time_ns);
+  if (swing_) swing_->setTorque(tmc_->torque());
+  chip_.configure(tmc_->configured(), time_ns);
   follow({}, time_ns);
 }
 

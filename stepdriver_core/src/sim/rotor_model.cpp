@@ -41,9 +41,21 @@ MotorSpec soundMotor(MotorSpec motor, double rate, double acceleration) {
 }
 
 RotorModel::RotorModel(const MotorSpec& spec)
-    : frequency_(std::sqrt(spec.pole_pairs * spec.holding_torque / spec.inertia)),
+    : full_frequency_(std::sqrt(spec.pole_pairs * spec.holding_torque / spec.inertia)),
+      full_friction_(spec.friction / spec.holding_torque),
       damping_(spec.damping),
-      friction_(spec.friction / spec.holding_torque) {}
+      frequency_(full_frequency_),
+      friction_(full_friction_) {}
+
+void RotorModel::setTorque(double part) {
+  if (part == torque_) return;
+  torque_ = part;
+  const double before = frequency_;
+  frequency_ = full_frequency_ * std::sqrt(part);
+  friction_ = full_friction_ / part;
+  speed_ *= before / frequency_;
+  settled_ = false;
+}
 
 std::int64_t RotorModel::turnTo(std::int64_t time_ns) {
   std::int64_t behind = 0;

@@ -36,6 +36,9 @@ class RotorModel {
   /// A step. @pre turnTo() its time @param angle [electrical rad]
   void moveField(double angle);
 
+  /// The coils have another current from now on. @param part of the holding torque, above 0
+  void setTorque(double part);
+
   /// Nothing turns the rotor: it stands where the field was.
   void rest(std::int64_t time_ns);
   /// The field catches a rotor that stands still, this far behind it. That is no lag behind steps.
@@ -61,11 +64,14 @@ class RotorModel {
   std::int64_t slip();
   void settle();
 
-  const double frequency_;  // [rad/s]
+  const double full_frequency_;  // [rad/s] with the whole holding torque
+  const double full_friction_;   // in parts of the holding torque
   const double damping_;
-  const double friction_;  // in parts of the holding torque
-  double lag_ = 0.0;       // [electrical rad]
-  double speed_ = 0.0;     // the rotor's speed, in units of w
+  double torque_ = 1.0;  // the part of it that the present current makes
+  double frequency_;     // the same two with the present current
+  double friction_;
+  double lag_ = 0.0;    // [electrical rad]
+  double speed_ = 0.0;  // the rotor's speed, in units of w
   double largest_lag_ = 0.0;
   std::int64_t slips_ = 0;
   std::int64_t time_ns_ = kForEver;

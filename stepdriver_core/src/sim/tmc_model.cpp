@@ -1,5 +1,10 @@
 #include "tmc_model.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "rotor_model.h"
+
 namespace stepdriver::sim {
 namespace {
 
@@ -9,6 +14,7 @@ constexpr int kGstat = 0x01;
 constexpr int kIfcnt = 0x02;
 constexpr int kIoin = 0x06;
 constexpr int kIholdIrun = 0x10;
+constexpr int kSgResult = 0x41;
 constexpr int kMscnt = 0x6A;
 constexpr int kChopconf = 0x6C;
 constexpr int kDrvStatus = 0x6F;
@@ -41,6 +47,7 @@ void TmcModel::write(int number, std::uint32_t value) {
   const bool is_read_only =
       number == kIfcnt || number == kIoin || number == kMscnt || number == kDrvStatus;
   if (!is_read_only) registers_.at(static_cast<std::size_t>(number)) = value;
+  if (number == kIholdIrun && first_run_ == 0) first_run_ = runOf();
 }
 
 int TmcModel::microsteps() const {
@@ -52,6 +59,14 @@ int TmcModel::microsteps() const {
   }
   const std::uint32_t mres = registers_[kChopconf] >> 24U & 0xFU;
   return mres > 8 ? 1 : 256 >> mres;
+}
+
+ChipModel::Configured TmcModel::configured() const {
+  return {microsteps(), outputsOn(), (registers_[kChopconf] & 1U << 29U) != 0};
+}
+
+double TmcModel::torque() const {
+  return first_run_ == 0 ? 1.0 : static_cast<double>(runOf()) / static_cast<double>(first_run_);
 }
 
 bool TmcModel::outputsOn() const {
@@ -71,6 +86,17 @@ std::uint32_t TmcModel::status(const Senses& senses) const {
          bit(stealth, 30) | bit(senses.standstill, 31);
 }
 
+// It falls with the load, which makes the rotor lag: to 0 at the highest torque. At rest it keeps
+// its value.
+std::uint32_t TmcModel::stallGuard(const Senses& senses) const {
+  const bool stealth = (registers_[kGconf] & 4U) == 0;
+  if (stealth && !senses.standstill) {
+    const double load = std::min(std::abs(senses.lag) / (kPi / 2.0), 1.0);
+    stall_guard_ = 2 * static_cast<std::uint32_t>(std::lround(255.0 * (1.0 - load)));
+  }
+  return stall_guard_;
+}
+
 std::uint32_t TmcModel::read(int number, const Senses& senses) const {
   switch (number) {
     case kGstat:
@@ -81,6 +107,8 @@ std::uint32_t TmcModel::read(int number, const Senses& senses) const {
       return bit(senses.enn, 0) | bit((spec_.address & 1) != 0, 2) |
              bit((spec_.address & 2) != 0, 3) | bit(senses.diag, 4) | bit(senses.step, 7) |
              bit(senses.dir, 9) | static_cast<std::uint32_t>(spec_.version) << 24U;
+    case kSgResult:
+      return stallGuard(senses);
     case kMscnt:
       return static_cast<std::uint32_t>(senses.mscnt);
     case kDrvStatus:

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "chip_model.h"
 #include "stepdriver_core/sim/rig.h"
 
 namespace stepdriver::sim {
@@ -22,6 +23,7 @@ class TmcModel {
     int mscnt = 0;
     bool standstill = true;
     bool outputs_failed = false;  ///< a short or over-temperature has switched them off
+    double lag = 0.0;             ///< [electrical rad] of the rotor behind the field
   };
 
   /// The supply is there again.
@@ -36,8 +38,11 @@ class TmcModel {
 
   /// @name What its registers mean to the motor
   /// @{
-  int microsteps() const;
+  ChipModel::Configured configured() const;
   bool outputsOn() const;
+  /// The torque, as a part of that of the first run current that was written: the motor was chosen
+  /// for that.
+  double torque() const;
   /// Its own pulses turn the motor (VACTUAL).
   bool turnsByItself() const { return written(kVactualNumber) != 0; }
   /// @}
@@ -52,6 +57,9 @@ class TmcModel {
  private:
   static constexpr int kVactualNumber = 0x22;
 
+  int microsteps() const;
+  std::uint32_t runOf() const { return (registers_[0x10] >> 8U & 0x1FU) + 1; }
+  std::uint32_t stallGuard(const Senses& senses) const;
   std::uint32_t status(const Senses& senses) const;
 
   TmcSpec spec_;
@@ -60,6 +68,8 @@ class TmcModel {
   std::uint8_t writes_ = 0;  // IFCNT
   bool was_reset_ = true;
   bool driver_error_ = false;
+  std::uint32_t first_run_ = 0;  // IRUN + 1; 0: nothing was written yet
+  mutable std::uint32_t stall_guard_ = 0;
 };
 
 }  // namespace stepdriver::sim

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "configuration.h"
+#include "drivers_report.h"
 #include "interrupt_watch.h"
 #include "lines_report.h"
 #include "move.h"
@@ -19,6 +20,7 @@
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/setup/driver_check.h"
 #include "system_report.h"
 
 namespace stepdriver::check {
@@ -29,6 +31,7 @@ constexpr int kExitConfig = 1;
 constexpr int kExitLines = 2;
 constexpr int kExitRates = 3;
 constexpr int kExitMove = 4;
+constexpr int kExitDrivers = 5;
 constexpr int kExitUsage = 64;
 
 constexpr std::chrono::seconds kWarning{2};
@@ -53,6 +56,7 @@ class Check {
   int run() {
     section("Configuration: " + options_.config, configurationText(config_));
     reportLines();
+    reportDrivers();
     const SystemFacts facts = systemFacts();
     section("Permissions", permissionsText(facts));
     measure();
@@ -93,8 +97,30 @@ class Check {
              report.missing, report.missing == 1 ? "line is" : "lines are"));
   }
 
+  // Their lines were found, and nothing else holds them.
+  void reportDrivers() {
+    const auto has_tmc = [](const config::AxisConfig& axis) { return axis.hasTmc(); };
+    if (!real_ || exit_code_ != kExitGood ||
+        std::none_of(config_.axes.begin(), config_.axes.end(), has_tmc)) {
+      return;
+    }
+    try {
+      const auto backend = gpio::makeLibgpiodBackend();
+      const auto findings = setup::checkDrivers(config_.axes, *backend, options_.wiring);
+      section("Drivers on a UART", driversText(findings));
+      const auto wrong =
+          std::count_if(findings.begin(), findings.end(),
+                        [](const setup::DriverFinding& finding) { return !finding.is_right; });
+      if (wrong > 0) {
+        note(kExitDrivers, "a driver on a UART, or a line to one, is wrong (see above).");
+      }
+    } catch (const GpioError& error) {
+      note(kExitLines, error.what());
+    }
+  }
+
   void measure() {
-    if (real_ && exit_code_ == kExitGood) {
+    if (real_ && (exit_code_ == kExitGood || exit_code_ == kExitDrivers)) {
       try {
         const auto backend = gpio::makeLibgpiodBackend();
         capability_ = machine::measure(config_.axes, *backend, clock_, config_.options().realtime);

@@ -12,6 +12,7 @@ struct Options {
   bool help = false;
   std::string config;
   BackendChoice backend = BackendChoice::kAsInTheFile;
+  bool wiring = false;  ///< test the lines to the drivers that are on a UART
   bool move = false;
   std::string axis;                ///< the only axis to move; empty: all, one after the other
   std::optional<double> distance;  ///< [mm|deg]

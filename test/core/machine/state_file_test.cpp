@@ -227,6 +227,9 @@ TEST_F(StateFileTest, OpensWithABrokenFileAndSaysWhereItIsBroken) {
            {head + "x linear 80000 0.008 0 1 0 1 7\n", "line 3"},
            {head + "x linear 80000 0.008 0 1 0 1 0 1\n", "line 3"},
            {head + "x linear -1 0.008 0 1 0 1\n", "line 3"},
+           {head + "x linear 80000 0.008 0 1 0 1 0 @1024\n", "line 3"},
+           {head + "x linear 80000 0.008 0 1 0 1 0 @-2\n", "line 3"},
+           {head + "x linear 80000 0.008 0 1 0 1 0 @\n", "line 3"},
            {head + "x crooked 80000 0.008 0 1 0 1\n", "line 3"},
            {twice, "line 4"}}) {
     SCOPED_TRACE(content);
