@@ -134,6 +134,11 @@ def latched(name):
 def topics(types, published):
     said = on_page("Topics")
     del said["/clock"]  # only with publish_clock
+    # Only with a chip on a UART, see test/node/tmc_test.cpp.
+    _, of_type, fields, _ = [said.pop(f"{NODE}/{axis}/driver") for axis in ("x", "r")][0]
+    of_driver = set(roslib.message.get_message_class(of_type).__slots__) - {"header"}
+    if of_driver != fields_in(fields):
+        yield f"{of_type} has {sorted(of_driver)}, and on the page {sorted(fields_in(fields))}"
     yield from compare(
         "topic",
         # Debian has no control_msgs: the node's own message is the same on the wire.

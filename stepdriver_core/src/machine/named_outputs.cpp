@@ -145,7 +145,7 @@ std::string NamedOutput::endWrite(activity::Context& context) {
   const Job job = *std::exchange(job_, std::nullopt);
   const std::vector<SharedCall> calls = std::exchange(write_calls_, {});
   if (const int error = context.pin_done->error; error != 0) {
-    const std::string text = failed(error, context);
+    std::string text = failed(error, context);
     gave_up_ = job.safe;
     for (const SharedCall& call : calls) call->fail({Failure::Kind::kGpio, text});
     return text;

@@ -43,7 +43,7 @@ TEST(RegisterUart, CountsWritesBeyond255) {
 
 // What comes back names the fault.
 TEST(RegisterUart, TellsCausesApart) {
-  const auto failureOf = [](test::WiredStream& stream) {
+  const auto failure_of = [](test::WiredStream& stream) {
     RegisterUart uart(stream, kBaud);
     std::uint32_t value = 0;
     const Failure failure = uart.read(0, kIoin, 0, value);
@@ -53,30 +53,30 @@ TEST(RegisterUart, TellsCausesApart) {
   test::WiredStream cut;
   cut.add(0);
   cut.is_cut = true;
-  EXPECT_EQ(failureOf(cut), Failure::kNothing);
+  EXPECT_EQ(failure_of(cut), Failure::kNothing);
 
   test::WiredStream other_address;
   other_address.add(1);
-  EXPECT_EQ(failureOf(other_address), Failure::kOnlyEcho);
+  EXPECT_EQ(failure_of(other_address), Failure::kOnlyEcho);
 
   test::WiredStream no_power;
   no_power.add(0).setPower(false);
-  EXPECT_EQ(failureOf(no_power), Failure::kOnlyEcho);
+  EXPECT_EQ(failure_of(no_power), Failure::kOnlyEcho);
 
   test::WiredStream no_echo;
   no_echo.add(0);
   no_echo.wire.setFaults({0.0, 0.0, 0.0, true});
-  EXPECT_EQ(failureOf(no_echo), Failure::kNoEcho);
+  EXPECT_EQ(failure_of(no_echo), Failure::kNoEcho);
 
   test::WiredStream noise;
   noise.add(0);
   noise.wire.setFaults({0.0, 0.0, 1.0, false});
-  EXPECT_EQ(failureOf(noise), Failure::kGarbled);
+  EXPECT_EQ(failure_of(noise), Failure::kGarbled);
 
   test::WiredStream twins;
   twins.add(0);
   twins.add(0, 0x20);
-  EXPECT_EQ(failureOf(twins), Failure::kGarbled);
+  EXPECT_EQ(failure_of(twins), Failure::kGarbled);
 }
 
 TEST(RegisterUart, IgnoresBytesThatWereThereBefore) {

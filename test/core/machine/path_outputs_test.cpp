@@ -170,15 +170,15 @@ TEST_F(PathOutputs, AreSwitchedInTheMiddleOfARoundedCorner) {
   const std::vector<std::int64_t> on = edges();
   ASSERT_EQ(on.size(), 1U);
   // There, both axes are as far from the corner.
-  const auto countAt = [&](const std::string& name) {
+  const auto count_at = [&](const std::string& name) {
     std::int64_t count = 0;
     for (const Step& step : steps(name)) {
       if (step.time_ns <= on[0]) count = step.count;
     }
     return count;
   };
-  EXPECT_NEAR(static_cast<double>(800 - countAt("x")), static_cast<double>(countAt("y")), 1.0);
-  EXPECT_GT(countAt("y"), 5);
+  EXPECT_NEAR(static_cast<double>(800 - count_at("x")), static_cast<double>(count_at("y")), 1.0);
+  EXPECT_GT(count_at("y"), 5);
 }
 
 TEST_F(PathOutputs, AtStopsAtTheBeginAndAtTheEndTheyComeWithThePlannedTimes) {
