@@ -489,7 +489,13 @@ TEST(TmcDrivers, NameAMissingPort) {
 class TmcTerminal : public testing::Test {
  protected:
   TmcTerminal() {
-    stream_.add(0);
+    stream_.add(0);  // before there is the thread that reads it
+    terminals_ = std::make_unique<test::SerialTerminals>(
+        std::vector<std::string>{kPort},
+        [this](const std::string&, const std::uint8_t* bytes, std::size_t count, bool pause) {
+          if (pause) stream_.wire.pause();
+          return stream_.wire.send(bytes, count);
+        });
     config_.tmc->port = terminals_->pathOf(kPort);
   }
   std::vector<sim::RigAxisSpec> rig() const {
@@ -506,12 +512,7 @@ class TmcTerminal : public testing::Test {
   }
 
   test::WiredStream stream_;
-  std::unique_ptr<test::SerialTerminals> terminals_ = std::make_unique<test::SerialTerminals>(
-      std::vector<std::string>{kPort},
-      [this](const std::string&, const std::uint8_t* bytes, std::size_t count, bool pause) {
-        if (pause) stream_.wire.pause();
-        return stream_.wire.send(bytes, count);
-      });
+  std::unique_ptr<test::SerialTerminals> terminals_;
   config::AxisConfig config_ = tmcAxis();
 };
 
