@@ -109,7 +109,7 @@ class PathOutputs {
     config::OutputConfig config;
     pulse::OutputLineState state;
     Line line;
-    std::uint64_t serial = 0;  // of the last command
+    std::uint64_t serial = 0;  // that the last command has
     std::optional<Taken> taken_by;
     std::optional<bool> wanted;  // when it is free again
     std::deque<Kept> kept;

@@ -56,7 +56,7 @@ class BusThreads {
   const Open open_;
   const bool threaded_;
   const std::function<void()> told_;
-  mutable std::mutex mutex_;  // of the next four, and of the jobs
+  mutable std::mutex mutex_;  // protects the next four, and the jobs
   std::map<std::string, std::unique_ptr<Port>> ports_;
   std::vector<RegisterDone> done_;
   std::size_t under_way_ = 0;

@@ -19,7 +19,7 @@ class UsedPorts {
  private:
   struct Port {
     int baud = 0;
-    std::string key;                   // of the map that gave the rate
+    std::string key;                   // names the map that gave the rate
     std::map<int, std::string> chips;  // the keys of their maps, by address
   };
   std::map<std::string, Port> ports_;

@@ -34,12 +34,6 @@ constexpr const char* kLateRemedy =
     "call "
     "recover, and home it or set its position";
 
-/// The count of one of the motors of an axis.
-std::int64_t countOf(const axis::AxisModel& axis, std::size_t motor) {
-  const pulse::ChannelState& state = axis.motor.state();
-  return axis.sharers().empty() ? state.count + state.lags.at(motor) : state.own;
-}
-
 }  // namespace
 
 Controller::Controller(const std::vector<config::AxisConfig>& axes,
@@ -332,7 +326,7 @@ void Controller::superviseChips(axis::AxisModel& axis) {
     if (!rests) chip->resting_count.reset();
     if (context_.now < pollDue(*chip)) continue;
     const bool audits = rests && context_.now >= chip->next_audit;
-    if (audits) chip->resting_count = countOf(axis, i);
+    if (audits) chip->resting_count = axis.motor.countOf(i);
     bus::RegisterJob job = chip->poll(audits);
     job.id = chip->polling = context_.newJob();
     context_.out->register_jobs.push_back(std::move(job));
@@ -362,7 +356,7 @@ void Controller::takePoll(axis::AxisModel& axis, std::size_t motor, const bus::R
   axis.motor.noteChips();
   // Without a change meanwhile: of its mode, or by a step that was still on its way.
   const auto count = std::exchange(chip.resting_count, {});
-  if (fault.empty() && count == countOf(axis, motor)) {
+  if (fault.empty() && count == axis.motor.countOf(motor)) {
     chip.next_audit = context_.now + kAuditPeriod;
     fault = chip.audited(*count, axis.motor.microsteps());
   }

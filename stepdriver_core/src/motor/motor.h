@@ -59,6 +59,11 @@ class Motor {
   const Power& power() const { return power_; }
   Brake& brake() { return brake_; }
   const Brake& brake() const { return brake_; }
+  /// The count of one of the motors.
+  std::int64_t countOf(std::size_t motor) const {
+    return is_shared_ ? state_.own : state_.count + state_.lags.at(motor);
+  }
+
   /// @name The translators
   /// @{
   /// That of an axis with one motor: only such a one changes its mode.
@@ -134,10 +139,6 @@ class Motor {
   };
 
   bool isHeldByOthers(int enable_line) const;
-  /// The count of one of the motors.
-  std::int64_t countOf(std::size_t motor) const {
-    return is_shared_ ? state_.own : state_.count + state_.lags.at(motor);
-  }
 
   const int channel_;
   const MotorLines lines_;

@@ -52,6 +52,24 @@ class EngineWithHorizon : public PulseEngineTest {
     return shared;
   }
 
+  /// Two motors move towards their switches, at lines 7 and 8, from their steps at lines 0 and 2.
+  /// The switch of the first one becomes active after 10 ms.
+  void squareGantry(int max_skew) {
+    ChannelConfig gantry = config(0);
+    gantry.endstop_max = Signal{7, true};
+    gantry.max_skew = max_skew;
+    MotorSignals& twin = gantry.twins.emplace_back();
+    twin.step.line = 2;
+    twin.dir.line = 3;
+    twin.endstop_max = Signal{8, true};
+    makeAhead({gantry});
+    Follow& order = plan(cruise(kStart, 0, 1'000, 10'000.0));
+    order.squares = order.is_square = true;
+    postFollows(1);
+    run(kStart + 10 * kMillisecond);
+    lines.inputs[7] = 1;
+  }
+
   std::int64_t rises(int line) { return static_cast<std::int64_t>(lines.rises(line).size()); }
 
   std::unique_ptr<test::AheadPort> port;
@@ -273,19 +291,7 @@ TEST_F(EngineWithHorizon, PassesASwitchBehindAnAxisThatSharesItsMotors) {
 }
 
 TEST_F(EngineWithHorizon, SquaresTheMotorsOfAGantryAtTheirOwnSwitches) {
-  ChannelConfig gantry = config(0);
-  gantry.endstop_max = Signal{7, true};
-  gantry.max_skew = 500;
-  MotorSignals& twin = gantry.twins.emplace_back();
-  twin.step.line = 2;
-  twin.dir.line = 3;
-  twin.endstop_max = Signal{8, true};
-  makeAhead({gantry});
-  Follow& order = plan(cruise(kStart, 0, 1'000, 10'000.0));
-  order.squares = order.is_square = true;
-  postFollows(1);
-  run(kStart + 10 * kMillisecond);
-  lines.inputs[7] = 1;
+  squareGantry(500);
   const std::int64_t first = rises(0);
   run(kStart + 20 * kMillisecond);
   lines.inputs[8] = 1;
@@ -302,19 +308,7 @@ TEST_F(EngineWithHorizon, SquaresTheMotorsOfAGantryAtTheirOwnSwitches) {
 }
 
 TEST_F(EngineWithHorizon, EndsASquaringBeforeItsMotorsAreFurtherApartThanAllowed) {
-  ChannelConfig gantry = config(0);
-  gantry.endstop_max = Signal{7, true};
-  gantry.max_skew = 30;
-  MotorSignals& twin = gantry.twins.emplace_back();
-  twin.step.line = 2;
-  twin.dir.line = 3;
-  twin.endstop_max = Signal{8, true};
-  makeAhead({gantry});
-  Follow& order = plan(cruise(kStart, 0, 1'000, 10'000.0));
-  order.squares = order.is_square = true;
-  postFollows(1);
-  run(kStart + 10 * kMillisecond);
-  lines.inputs[7] = 1;
+  squareGantry(30);
   run(kStart + 300 * kMillisecond);
   EXPECT_EQ(engine->channel(0).end, EndReason::kSkewed);
   EXPECT_EQ(rises(2) - rises(0), 30);
