@@ -34,8 +34,8 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
  public:
   struct Options {
     bool threaded = true;
-    std::int64_t write_timeout_ns =
-        0;  ///< for one write of a line that the pulse thread doesn't time
+    /// The timeout of one write of a line that the pulse thread doesn't time.
+    std::int64_t write_timeout_ns = 0;
     pulse::RealtimeRequest realtime;
     /// Called when a motion begins, by the thread that all axes wait for: it returns at once.
     std::function<void()> on_motion;
@@ -59,9 +59,9 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   /// @throw Error without threads, if nothing is in progress that could change its answer.
   /// @throw GpioError if the pulse thread hangs.
   void wait(const std::function<bool()>& ready, bool often = false);
-  /// The same for at most this time: of the steady clock, or without threads of the machine's. Then
-  /// it also reads the inputs, like the thread that watches them.
-  /// @return whether `ready` has returned true.
+  /// As wait(), but for at most this time of the steady clock. Without threads it is a time of the
+  /// machine's clock, and the call also reads the inputs, like the thread that watches them.
+  /// @return Whether `ready` has returned true.
   bool waitFor(const std::function<bool()>& ready, std::chrono::nanoseconds longest);
 
   /// Returns once a turn of the controller that is under way has ended: what it has set an outcome
@@ -82,7 +82,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   /// To be called when the engine was asked to stop: a pulse thread that hangs must be noticed.
   void wakeUp();
 
-  /// As Machine::responds().
+  /// Does what Machine::responds() does.
   bool responds(std::chrono::nanoseconds longest);
 
   /// The permissions of the pulse thread.
@@ -106,7 +106,7 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   struct Patience {
     std::chrono::nanoseconds longest = std::chrono::nanoseconds::max();
     bool often = false;         ///< `ready` is also called each millisecond
-    bool reads_inputs = false;  ///< without threads, each millisecond
+    bool reads_inputs = false;  ///< the inputs are read each millisecond, without threads
   };
   bool await(const std::function<bool()>& ready, const Patience& patience);
   bool awaitThreads(const std::function<bool()>& ready, const Patience& patience);
@@ -143,20 +143,20 @@ class Shell : public pulse::NewsListener, private ShellCore::Host {
   std::condition_variable round_ended_;
   std::uint64_t rounds_ = 0;  // counts the rounds of the controller's thread
 
-  // Calls of clients, and their answers.
+  // These members hold the calls of clients and their answers.
   mutable std::mutex answers_mutex_;
   std::condition_variable answered_;
   std::unordered_map<activity::CallId, Call> answers_;
-  std::uint64_t changes_ = 0;      // counts what a waiting client may want to look at
+  std::uint64_t changes_ = 0;      // counts the changes that a waiting client may want to look at
   std::uint64_t turns_ended_ = 0;  // counts the controller's turns
   std::string why_hung_;
   std::shared_ptr<const MachineSnapshot> snapshot_;
 
   std::atomic<bool> news_hold_{false};  // the clock is held for news that hasn't been handled yet
 
-  // Of the thread that runs the controller.
+  // Only the thread that runs the controller uses these.
   std::uint64_t passes_seen_ = 0;   // the pulse thread's count when it was last seen
-  std::int64_t looks_in_vain_ = 0;  // since it has begun or ended a pass
+  std::int64_t looks_in_vain_ = 0;  // counts the looks since it has begun or ended a pass
   std::int64_t next_look_ns_ = 0;
   pulse::Nanoseconds engine_due_ = 0;
 

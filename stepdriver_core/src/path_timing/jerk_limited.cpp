@@ -22,24 +22,28 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
-// Of a limit: rounded times and numbers change a jerk or an acceleration by no more. The times of
-// both ends of a quintic of the duration h are rounded by e each, which changes its jerk j by
-// 9 j e/h. Numbers that are rounded by r change it by 60 r/h^3, and its acceleration by 5.8 r/h^2,
-// if they are positions, and by 24 r/h^2 and 4 r/h if they are speeds: knots aren't closer than
-// that allows.
+// Rounded times and numbers change a jerk or an acceleration by no more than these parts of its
+// limit. The times of both ends of a quintic of the duration h are rounded by e each, which changes
+// its jerk j by 9 j e/h. Numbers that are rounded by r change it by 60 r/h^3, and its acceleration
+// by 5.8 r/h^2, if they are positions, and by 24 r/h^2 and 4 r/h if they are speeds. Knots are
+// never closer than that allows.
 constexpr double kMostRoundingOfTimes = 4.5e-5;
 constexpr double kLargestRounding = 1e-3;
-constexpr int kMostPlansOfAverage = 12;  // with one time of the average
+constexpr int kMostPlansOfAverage = 12;  // Each time of the average gets at most so many plans.
 constexpr double kNoExcess = 1e-3;
-constexpr double kNoPart = 1e-9;          // of a segment
-constexpr double kSquareRounding = 1e-9;  // of the square of a speed
+// A shorter part of a segment counts as nothing.
+constexpr double kNoPart = 1e-9;
+// Rounding changes the square of a speed by no more than this part of it.
+constexpr double kSquareRounding = 1e-9;
 constexpr double kNoDifference = 1e-6;
-constexpr double kLowerMoreBy = 2e-3;  // at first, than by what exceeds a limit
+// What exceeds a limit is lowered by this part more than it exceeds it, and by more with each plan.
+constexpr double kLowerMoreBy = 2e-3;
 constexpr double kLowerMostMoreBy = 0.1;
-constexpr double kShorterBy = 0.7;              // the time of the average
-constexpr double kShortestAverage = 1e-3;       // s
-constexpr double kMostQuinticDeviation = 0.05;  // of the resolution
-constexpr double kNearFoot = 1e-3;              // of the resolution
+constexpr double kShorterBy = 0.7;         // factor between two times of the average
+constexpr double kShortestAverage = 1e-3;  // [s]
+// Parts of the path's resolution.
+constexpr double kMostQuinticDeviation = 0.05;
+constexpr double kNearFoot = 1e-3;
 constexpr int kMostDivisionRounds = 4;
 constexpr std::size_t kPartsOfDivision = 4;
 
@@ -54,12 +58,13 @@ class JerkLimitedSection {
 
   struct Plan {
     JerkLimitedKnots knots;
-    std::vector<std::size_t> segments;  // of the knots
-    std::vector<bool> straight;         // the way to the next knot, at constant acceleration
-    double time = 0.0;                  // of the average
-    double settled = 0.0;               // s
+    std::vector<std::size_t> segments;  // each knot's segment
+    std::vector<bool> straight;  // The way to the next knot is straight, at constant acceleration.
+    double time = 0.0;           // [s] the time of the average
+    double settled = 0.0;        // [s]
     double slowdown = 1.0;
-    double excess = 1.0;  // if it begins at a speed: it can't be slowed down as a whole
+    // By which factor a motion that begins at a speed exceeds a limit: it can't be slowed down.
+    double excess = 1.0;
     bool possible() const { return excess <= 1.0 + kNoExcess; }
     double duration() const { return knots.back().time * slowdown; }
     bool isBetterThan(const Plan& other) const {
@@ -105,7 +110,7 @@ class JerkLimitedSection {
     });
   }
 
-  /// @name Of a section of lines, for cornerSpeeds()
+  /// @name A section of lines, for cornerSpeeds()
   /// @{
   LineBetweenCorners lineOf(std::size_t segment) const {
     PathPoint from;
@@ -123,7 +128,7 @@ class JerkLimitedSection {
     line.in_first = path_.roundedUntil(segment) * line.length;
     line.in_last = (1.0 - path_.roundedFrom(segment)) * line.length;
     const std::vector<bool>& measured = path_.measured(segment);
-    double rate = 0.0;  // squared, of the measured axes
+    double rate = 0.0;  // the square of the measured axes' rate
     line.limits = {kUnlimited, kUnlimited, kUnlimited, kUnlimited};
     for (std::size_t j = 0; j < limits_.size(); ++j) {
       const double part = std::abs(way[j]) / line.length;
@@ -192,7 +197,7 @@ class JerkLimitedSection {
     }
   }
 
-  // Empty if a line is too short for the change of the speed, by rounding.
+  // The result is empty if a line is too short for the change of the speed by rounding.
   std::optional<Plan> planThroughCorners(const std::vector<double>& speeds) const {
     std::vector<AveragedPart> parts;
     AveragedPart at;
@@ -253,7 +258,7 @@ class JerkLimitedSection {
     return plan;
   }
 
-  // Of the quintic that ends at a knot.
+  // The usage of the limits by the quintic that ends at a knot.
   LimitUsage usageBefore(const JerkLimitedKnots& knots, std::size_t index) const {
     LimitUsage usage;
     const double duration = knots[index].time - knots[index - 1].time;
@@ -275,7 +280,7 @@ class JerkLimitedSection {
   // What the average contains when it begins at a speed: a motion at constant acceleration for the
   // time T that has this mean place, speed and acceleration.
   struct History {
-    double begin = 0.0;  // unit
+    double begin = 0.0;  // [unit]
     double begin_speed = 0.0;
     double end = 0.0;
     double end_speed = 0.0;
@@ -311,7 +316,8 @@ class JerkLimitedSection {
     return false;
   }
 
-  // [s] See kLargestRounding. @param time of the average [s].
+  // [s] The least time between two knots, see kLargestRounding.
+  // @param time the time of the average [s].
   double closestKnots(const std::vector<AveragedPart>& parts, double time) const {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double duration = parts.back().time;
@@ -353,7 +359,8 @@ class JerkLimitedSection {
     for (int i = 0; i < kProjections; ++i) {
       path_.evaluate(of.segment, parameter, point);
       double along = 0.0;
-      double rate = 0.0;  // squared, as the two others
+      // All three are squares.
+      double rate = 0.0;
       double turn = 0.0;
       square = 0.0;
       for (std::size_t j = 0; j < limits_.size(); ++j) {
@@ -369,7 +376,7 @@ class JerkLimitedSection {
         turn += point.second[j] * point.second[j];
       }
       square -= along * along / rate;
-      const double change = along / rate;  // of the parameter
+      const double change = along / rate;  // the change of the parameter
       parameter = std::clamp(parameter + change, of.from, of.to);
       // Nearer to the foot, the path is where its tangent is.
       if (std::sqrt(turn) * change * change < kNearFoot * path_.resolution()) break;
@@ -405,7 +412,7 @@ class JerkLimitedSection {
 
     // [s] No later plan takes less.
     double shortest() const { return shortest_; }
-    // [s] Of the best plan so far.
+    // [s] The duration of the best plan so far.
     double duration() const { return best_.excess < kUnlimited ? best_.duration() : kUnlimited; }
     // Whether a later plan may be better.
     bool isOpen() const { return open_; }
@@ -486,7 +493,7 @@ class JerkLimitedSection {
 
   double capOf(std::size_t interval, const Reachability& speed) const;
 
-  // Adds to what is lowered.
+  // Makes a plan, and adds what exceeds a limit in it to `lowered`.
   Plan planOnce(double time, Lowered& lowered) const {
     History history;
     if (moves()) {
@@ -567,7 +574,8 @@ class JerkLimitedSection {
     return plan;
   }
 
-  // Whether the motion up to its begin is as it was; then the begin is the second place.
+  // Returns whether the motion up to its begin is as it was. If so, the begin becomes the second
+  // place.
   static bool keepPast(std::vector<SpeedPlace>& places, const SpeedPlace& past,
                        const SpeedPlace& begin) {
     const double close = kNoDifference * (begin.distance - past.distance);
@@ -586,7 +594,7 @@ class JerkLimitedSection {
     return true;
   }
 
-  // [unit/s] The speed limits there hold for the average, which has been within them so far.
+  // [unit/s] The speed limits near the begin apply to the average, which has kept them so far.
   double nearBegin(double highest, double speed) const {
     if (begin_.acceleration < 0.0) highest = std::min(highest, speed);
     const bool close = highest < speed && speed < kMostOver * highest;
@@ -615,7 +623,7 @@ class JerkLimitedSection {
   // from peaks.
   double settledIn(const PathGrid& grid, double begin, double time, Reachability& speed) const {
     const Path::Place open = path_.openFrom();
-    double lowest = kUnlimited;  // that will be higher
+    double lowest = kUnlimited;  // the lowest speed limit that may rise if the path continues
     double from = kUnlimited;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
       const PathGrid::Interval& interval = grid_[i];
@@ -700,7 +708,7 @@ class JerkLimitedSection {
       for (std::size_t k = knots[i - 1].interval; k <= knots[i].interval; ++k) {
         straight = straight && grid[k].straight;
       }
-      // So slowly, a curve makes no difference.
+      // At so low a speed, a curve makes no difference.
       if (speed < kSlow * lowestCap(knots[i - 1].distance, knots[i].distance)) straight = true;
       const std::size_t last = std::min(knots[i].part + 1, parts.size() - 1);
       double acceleration = 0.0;
@@ -721,7 +729,7 @@ class JerkLimitedSection {
     return worst;
   }
 
-  // [unit/s] Of the intervals between two distances.
+  // [unit/s] The lowest cap of the intervals between two distances.
   double lowestCap(double from, double to) const {
     const double margin = kMargin * (to - from);
     auto span = std::upper_bound(caps_.begin(), caps_.end(), from + margin,
@@ -733,9 +741,11 @@ class JerkLimitedSection {
     return lowest;
   }
 
-  static constexpr double kMargin = 1e-9;  // of an interval, for rounding
-  static constexpr double kSlow = 0.2;     // of the highest constant speed along an interval
-  // Of the speed at the begin: no average that would first come nearer to rest.
+  // Part of an interval that rounding may change.
+  static constexpr double kMargin = 1e-9;
+  // Part of the highest constant speed along an interval, below which its curve doesn't matter.
+  static constexpr double kSlow = 0.2;
+  // Part of the speed at the begin. An average that would first slow down below it isn't tried.
   static constexpr double kLeastSpeed = 0.1;
   // The places of another grid, and what was lowered for it, make such a difference to a speed.
   static constexpr double kMostOver = 1.01;
@@ -744,7 +754,7 @@ class JerkLimitedSection {
   const std::vector<TimingLimits>& limits_;
   const TimingStart& begin_;
   PathGrid grid_;
-  std::vector<CeilingSpan> caps_;  // of the speed, of each interval
+  std::vector<CeilingSpan> caps_;  // each interval's cap of the speed
 };
 
 // [unit/s] The highest constant speed along an interval.
@@ -757,7 +767,7 @@ double JerkLimitedSection::capOf(std::size_t interval, const Reachability& speed
   for (std::size_t j = 0; j < limits_.size(); ++j) {
     const double begin = grid_.secondAtBegin(interval)[j];
     const double end = grid_.secondAtEnd(interval)[j];
-    // Of the parabola through the three.
+    // The slope of the parabola through the three second derivatives.
     const double third = std::max(std::abs(-3.0 * begin + 4.0 * middle.second[j] - end),
                                   std::abs(begin - 4.0 * middle.second[j] + 3.0 * end)) /
                          length;
@@ -769,15 +779,15 @@ double JerkLimitedSection::capOf(std::size_t interval, const Reachability& speed
   return cap;
 }
 
-// @param before [s] see TimingStart.
+// @param before [s] See TimingStart::before.
 TimingStart atRest(double before) {
   TimingStart begin;
   begin.before = before;
   return begin;
 }
 
-// The motion between two stops of the path, which may also stop at corners on the way instead of
-// rounding them: if that is faster.
+// The motion between two stops of the path. It also stops at corners on the way, instead of
+// rounding them, if that is faster.
 class StopChoice {
  public:
   // The motion along some segments without a stop.
@@ -866,7 +876,7 @@ class StopChoice {
     return chosen;
   }
 
-  // @param speeds at the corners; 0: a stop.
+  // @param speeds The speeds at the corners; the motion stops at a corner whose speed is 0.
   std::vector<Run> throughCorners(const Path& path, TimingStart rest,
                                   const std::vector<double>& speeds) const {
     std::vector<std::size_t> stops;
@@ -925,8 +935,8 @@ class StopChoice {
     return runs;
   }
 
-  // @param path with the stops that have been chosen. @param stopping the runs from one corner
-  //   to the next along the way of `whole`.
+  // @param path The path with the stops that have been chosen.
+  // @param stopping The runs from one corner to the next along the way of `whole`.
   std::vector<Run> choose(const Path& path, Run whole, std::vector<Run> stopping) const {
     std::vector<Run> chosen;
     if (stopping.size() < 2 || whole.plan.duration() <= durationOf(stopping)) {
@@ -939,7 +949,7 @@ class StopChoice {
       if (stops[i]) corners.push_back(stopping[i].last);
     }
     const Path stopped = path.withStops(corners);
-    std::vector<Run> between;  // two stops
+    std::vector<Run> between;  // the runs since the last stop
     for (std::size_t i = 0; i < stopping.size(); ++i) {
       between.push_back(std::move(stopping[i]));
       if (!stops[i]) continue;
@@ -953,8 +963,9 @@ class StopChoice {
     return chosen;
   }
 
-  // Whether the two runs at the corner after each run take longer in the whole motion; of a motion
-  // that takes longer than its runs, at least one corner. The last run ends at a stop.
+  // Returns for each run whether it and the next one take longer in the whole motion. If the whole
+  // motion takes longer than its runs, this is so at one corner at least. The last run ends at a
+  // stop.
   static std::vector<bool> slowCorners(const Run& whole, const std::vector<Run>& stopping) {
     std::vector<double> lost;
     lost.reserve(stopping.size());
@@ -984,7 +995,7 @@ class StopChoice {
   const Path& path_;
   const std::vector<TimingLimits>& limits_;
   const TimingStart& begin_;
-  double longest_ = 0.0;  // [s] no run begins later than that after begin_
+  double longest_ = 0.0;  // [s] No run begins later than this after begin_.
 };
 
 // The end of a segment, at rest.
@@ -1046,7 +1057,8 @@ PathTiming planJerkLimited(const Path& path, const std::vector<TimingLimits>& li
   for (std::size_t first = 0; first < path.size();) {
     std::size_t last = first;
     while (last + 1 < path.size() && !path.stopsAfter(last)) ++last;
-    if (first == last && from.parameter > 1.0 - kNoPart) {  // it begins at a stop
+    // It begins at a stop.
+    if (first == last && from.parameter > 1.0 - kNoPart) {
       if (from.speed > 0.0) made.excess = kUnlimited;
       made.knots.push_back(restAtEnd(path, first));
       from = atRest(from.before);

@@ -10,14 +10,16 @@
 namespace stepdriver::motion {
 namespace {
 
-constexpr double kSmallChange = 0.05;  // of the jerk, in parts of its limit: no knot
+// The jerk may change by this part of its limit without a knot.
+constexpr double kSmallChange = 0.05;
 // A quintic of the duration h with the states of a motion at its ends is off by at most this times
 // h^2 times the integral of what the jerk of the motion differs from a constant (the largest value
 // of the Peano kernel).
 constexpr double kPeanoKernel = 0.0173;
-constexpr double kMostJerkDeviation = 0.01;  // of the resolution, of that
+// Part of the resolution by which a quintic may be off for a change of the jerk that was left out.
+constexpr double kMostJerkDeviation = 0.01;
 
-// When a part of a smoothed motion has moved by a distance [s], before it ends.
+// [s] The time after which a part of a smoothed motion has moved by a distance, before it ends.
 double timeUntilMoved(const AveragedPart& part, double distance, double duration) {
   double low = 0.0;
   double high = duration;
@@ -68,7 +70,7 @@ class KnotMaker {
     return knots_.size() > 0 && (time - knots_.back().time < closest_ || time > last_);
   }
 
-  // From the interval that contains the motion to the next one, in a part.
+  // Within a part, the motion passes from the interval that contains it to the next one.
   void passInterval(std::size_t index) {
     const AveragedPart& part = parts_[index];
     const double duration = parts_[index + 1].time - part.time;
@@ -111,7 +113,8 @@ class KnotMaker {
     }
   }
 
-  // [unit/s^2] Of the acceleration: the part in which it changes is shorter than rounded times are.
+  // [unit/s^2] The jump of the acceleration before a part: the part in which the acceleration
+  // changed was shorter than rounded times.
   double jumpBefore(std::size_t index) const {
     const AveragedPart& before = parts_[index - 1];
     const AveragedPart& part = parts_[index];
@@ -146,7 +149,7 @@ class KnotMaker {
     return !straight || !isSmall(off, parts_.back().time - knots_.back().time);
   }
 
-  // In a part, before the end of the interval that contains the motion.
+  // Appends a knot within a part, before the end of the interval that contains the motion.
   void appendWithin(std::size_t index, double time) {
     const AveragedPart& part = parts_[index];
     const State state = stateOf(part, time - part.time);
@@ -191,14 +194,14 @@ class KnotMaker {
   const PathGrid& grid_;
   const std::vector<TimingLimits>& limits_;
   const std::vector<AveragedPart>& parts_;
-  double time_;     // of the average
-  double closest_;  // [s] knots
-  double most_;     // [unit] of off_ times h^2
-  double last_;     // [s] of a knot before the end
+  double time_;     // [s] the time of the average
+  double closest_;  // [s] the least time between two knots
+  double most_;     // [unit] the largest off_ times h^2 that is left out
+  double last_;     // [s] the latest time of a knot before the end
   JerkLimitedKnots knots_;
   PathPoint point_;
-  std::size_t interval_ = 0;  // that contains the motion
-  double begin_ = 0.0;        // of it [unit]
+  std::size_t interval_ = 0;  // the interval that contains the motion
+  double begin_ = 0.0;        // [unit] the begin of that interval
   double left_ = 0.0;         // [s] when the motion last left an interval or a part
   // What has been left out since the last knot: the integral of what the jerk differs from another
   // one, and the end or the begin of a curve.

@@ -19,8 +19,8 @@ class JerkLimitedKnots {
     double distance = 0.0;  ///< [unit]
     double speed = 0.0;     ///< [unit/s]
     std::size_t interval = 0;
-    std::size_t part = 0;       ///< of the smoothed motion, that ends or contains it
-    double parameter = 0.0;     ///< of the segment
+    std::size_t part = 0;       ///< the smoothed motion's part that ends at it or contains it
+    double parameter = 0.0;     ///< the segment's parameter
     double acceleration = 0.0;  ///< [unit/s^2]
     bool even = false;          ///< see AveragedPart
   };
@@ -65,8 +65,8 @@ double highestJerk(const PathGrid& grid, std::size_t interval,
 /// is the same. Small changes of the jerk are left out if the quintic without them deviates by a
 /// hundredth of `resolution` or less.
 ///
-/// @param time of the average [s].
-/// @param closest no knot is nearer to the one before [s].
+/// @param time The time of the average [s].
+/// @param closest The least time between two knots [s].
 JerkLimitedKnots makeKnots(const PathGrid& grid, const std::vector<TimingLimits>& limits,
                            const std::vector<AveragedPart>& parts, double time, double closest,
                            double resolution);

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kWidthRounding = 1e-9;
-constexpr double kUneven = 0.01;        // of the highest acceleration
-constexpr double kEvenRounding = 1e-6;  // of the time of the average
-constexpr int kMostRounds = 40;         // each of which joins maxima in pairs at least
+constexpr double kUneven = 0.01;        // part of the highest acceleration
+constexpr double kEvenRounding = 1e-6;  // part of the time of the average
+constexpr int kMostRounds = 40;         // Each round joins maxima at least in pairs.
 
 // A maximum that is being lowered: it lies between two places, and so does its end at each side.
 class Maximum {
@@ -30,7 +30,7 @@ class Maximum {
       if (left_ == 0 || width(level_) >= std::sqrt(level_) * time) return;
       const double before = places_[left_ - 1].square;
       const double after = places_[right_ + 1].square;
-      if (before > level_ || after > level_) return;  // a minimum
+      if (before > level_ || after > level_) return;  // It is a minimum.
       const double next = std::max(before, after);
       if (width(next) < std::sqrt(next) * time) {
         level_ = next;
@@ -64,7 +64,7 @@ class Maximum {
   double end(double level) const {
     return right_ + 1 == places_.size() ? places_[right_].distance : cross(right_, level);
   }
-  // Between a place and the next one.
+  // The distance at which the speed crosses a level between a place and the next one.
   double cross(std::size_t place, double level) const {
     const SpeedPlace& a = places_[place];
     const SpeedPlace& b = places_[place + 1];
@@ -89,7 +89,7 @@ class MotionCursor {
   struct State {
     double distance = 0.0;
     double speed = 0.0;
-    double acceleration = 0.0;  // from then on
+    double acceleration = 0.0;  // the acceleration after that time
   };
 
   /// [s] When the acceleration changes next.
@@ -185,7 +185,7 @@ std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time
       if (made.empty() || made.back().distance < place.distance) made.push_back(place);
     };
     bool lowered = false;
-    std::size_t next = 0;  // to be copied
+    std::size_t next = 0;  // the first place that hasn't been copied
     for (std::size_t i = 0, last = 0; i < places.size(); i = last + 1) {
       giveWayAt(i);
       for (last = i; last + 1 < places.size();) {
@@ -232,7 +232,7 @@ std::vector<AveragedPart> movingAverage(const std::vector<SpeedPlace>& places, d
   double distance = 0.0;
   for (double now = 0.0; now < kInfinity;) {
     giveWayAt(made.size());
-    const double changed = front.lastChange(kUneven * steepest);  // before now
+    const double changed = front.lastChange(kUneven * steepest);
     const MotionCursor::State ahead = front.at(now);
     const MotionCursor::State behind = rear.at(now);
     if (!made.empty()) {

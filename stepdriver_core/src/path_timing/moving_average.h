@@ -24,26 +24,26 @@ class Ceiling {
 
  private:
   std::vector<double> places_;
-  std::vector<double> values_;  // from each place on
+  std::vector<double> values_;  // the lowest value between each place and the next one
 };
 
 /// A place of a motion. Up to the next one the square of the speed is linear in the distance: the
 /// acceleration is constant.
 struct SpeedPlace {
   double distance = 0.0;  ///< [unit]
-  double square = 0.0;    ///< [unit^2/s^2] of the speed
+  double square = 0.0;    ///< [unit^2/s^2] the square of the speed
 };
 
 /// Lowers the speed around each of its maxima that lasts less than `time` to the highest one that
 /// then lasts so long, or to the higher one of the two minima around it: then they become one
 /// maximum, which is lowered as well.
 ///
-/// @param places to rest. The first one is at rest, or what is up to the second one has passed.
+/// @param places The last one is at rest. So is the first one, or the motion has passed the second.
 std::vector<SpeedPlace> flattenPeaks(std::vector<SpeedPlace> places, double time);
 
 /// A part of a smoothed motion, with constant jerk.
 struct AveragedPart {
-  double time = 0.0;          ///< [s] of its begin, as all that follows
+  double time = 0.0;          ///< [s] This and what follows are those at its begin.
   double distance = 0.0;      ///< [unit]
   double speed = 0.0;         ///< [unit/s]
   double acceleration = 0.0;  ///< [unit/s^2]
@@ -69,10 +69,10 @@ struct AveragedPart {
 /// one of speeds up to c. Going back in time from there, s0 falls by c or less per time, for T at
 /// least. Its average over T would then be after the place, which it is not.
 ///
-/// @param places from rest to rest; if it `moves`, the given motion was at the first one at the
-///   time -T and is at the second one at the time 0, when its average is at the distance 0.
-/// @param time T, above 0 [s]
-/// @return the last one is at rest.
+/// @param places The given motion, from rest to rest. If it `moves`, it was at the first place at
+///   the time -T, and is at the second one at the time 0, when its average is at the distance 0.
+/// @param time T, above 0 [s].
+/// @return The parts of the average. The last one is at rest.
 std::vector<AveragedPart> movingAverage(const std::vector<SpeedPlace>& places, double time,
                                         bool moves = false);
 

@@ -9,7 +9,7 @@ PinRing::PinRing(const std::vector<bool>& levels, std::size_t edges)
 
 PinRing::Copy PinRing::copy(Clock& clock) const {
   Copy copy;
-  // The levels first: if one of them changes after this, its edge is in the copy.
+  // The levels are copied first: if one of them changes after this, its edge is in the copy.
   for (const std::atomic<bool>& level : levels_) {
     copy.levels.push_back(level.load(std::memory_order_acquire));
   }

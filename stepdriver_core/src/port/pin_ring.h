@@ -32,8 +32,8 @@ class PinRing {
     std::vector<bool> levels;  ///< all outputs; one without an edge keeps its level
   };
 
-  /// @param levels of all outputs at the beginning.
-  /// @param edges that a copy contains, at least, once there were as many.
+  /// @param levels The levels of all outputs at the beginning.
+  /// @param edges A copy contains so many edges at least, once there were as many.
   PinRing(const std::vector<bool>& levels, std::size_t edges);
 
   /// An output was written. Nothing is recorded if it had this level already.
@@ -44,7 +44,7 @@ class PinRing {
     if (known.load(std::memory_order_relaxed) == level) return;
     addChange(output, level, time);
   }
-  /// The same of an output that others write too: it is recorded whatever level is known here.
+  /// Records an edge of an output that others write too, whatever level is known here.
   void addChange(int output, bool level, Nanoseconds time) {
     if (time - last_.load(std::memory_order_relaxed) > kLongestPause) ring_.clear();
     ring_.add({static_cast<std::uint64_t>(time) << kTimeShift |

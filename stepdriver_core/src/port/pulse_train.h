@@ -53,7 +53,7 @@ class PulseTrain {
     }
     return write;
   }
-  /// Of a motor's DIR line.
+  /// The write that turns a motor's DIR line.
   gpio::LineWrite turnOf(std::size_t motor, bool forward) const {
     const Signal& dir = signalsOf(motor).dir;
     return {dir.line, forward ? dir.active : !dir.active};
@@ -89,7 +89,7 @@ class PulseTrain {
   StepPort::Lane& lane_;
   const std::size_t motors_;
   const MotorSet all_motors_;
-  // By motor: its lines of pulses in the two directions.
+  // Each motor's lines of pulses in the two directions.
   std::array<Signal, kMostMotors> forward_;
   std::array<Signal, kMostMotors> backward_;
   MotorSet pulsed_;

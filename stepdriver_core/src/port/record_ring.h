@@ -25,12 +25,12 @@ class RecordRing {
     bool overwritten = false;  ///< there were older ones
   };
 
-  /// @param records that a copy contains, at least, once there were as many. All memory is touched
-  ///   here.
+  /// Touches all of its memory.
+  /// @param records A copy contains so many records at least, once there were as many.
   explicit RecordRing(std::size_t records)
       : words_((records / kBlock + 2) * kBlock * kWords), capacity_(words_.size() / kWords) {}
 
-  /// From one thread at a time.
+  /// To be called from one thread at a time.
   void add(const Record& record) {
     if (added_ % kBlock == 0) beginBlock();
     for (const std::uint64_t word : record) {
@@ -39,10 +39,10 @@ class RecordRing {
     end_.store(++added_, std::memory_order_release);
   }
 
-  /// From the thread that adds: forgets all records.
+  /// Forgets all records. To be called from the thread that adds.
   void clear() { begin_.store(added_, std::memory_order_relaxed); }
 
-  /// From any thread.
+  /// Safe from any thread.
   Copy copy() const {
     const std::uint64_t end = end_.load(std::memory_order_acquire);
     const std::uint64_t begin = std::max(begin_.load(std::memory_order_relaxed), oldest(end));
@@ -75,14 +75,14 @@ class RecordRing {
   }
 
   std::vector<std::atomic<std::uint64_t>> words_;
-  const std::uint64_t capacity_;  // in records: whole blocks
-  // Of the writer.
+  const std::uint64_t capacity_;  // in records; whole blocks
+  // Only the writer uses these.
   std::size_t position_ = 0;
   std::uint64_t added_ = 0;
 
   std::atomic<std::uint64_t> begin_{0};
   std::atomic<std::uint64_t> end_{0};
-  std::atomic<std::uint64_t> announced_{0};  // records before this one may be written now
+  std::atomic<std::uint64_t> announced_{0};  // Records before this one may be written now.
 };
 
 }  // namespace stepdriver::pulse

@@ -35,14 +35,14 @@ class StepPort {
  public:
   /// Lanes, a bit for each: the first one's is the lowest.
   using LaneSet = std::uint64_t;
-  static constexpr std::size_t kMostLanes = 64;  ///< of a port with a horizon
+  static constexpr std::size_t kMostLanes = 64;  ///< for a port with a horizon
   static LaneSet laneBit(std::size_t lane) { return LaneSet{1} << lane; }
 
   /// A step of a channel.
   struct Step {
     std::size_t channel = 0;
     int direction = 0;     ///< +1 or -1
-    Nanoseconds time = 0;  ///< at which it is planned
+    Nanoseconds time = 0;  ///< its planned clock time
     MotorSet still = 0;    ///< motors of the channel that don't take part
     /// For ports with a horizon: the lanes of the axes that it moves towards max, and towards min.
     /// Those are the channel's own, or those of the axes that share its motor.
@@ -62,8 +62,8 @@ class StepPort {
   /// A condition that a step didn't fulfil.
   struct Stop {
     EndReason reason = EndReason::kDone;
-    std::size_t lane = 0;   ///< whose input it was
-    std::size_t motor = 0;  ///< of that lane
+    std::size_t lane = 0;   ///< the lane whose input it was
+    std::size_t motor = 0;  ///< that lane's motor
     LineFailure failure;    ///< for kLineError
     MotorSet still = 0;     ///< the motors that have stopped at their own switches
   };
@@ -71,11 +71,11 @@ class StepPort {
   /// What the engine must know of a channel to put its next step. Written by the port only, in
   /// aim(), put(), takeBack() and serve().
   struct Lane {
-    bool busy = false;        ///< a pulse is out; no step is taken until it has ended
-    bool stepped = false;     ///< it has played a step
-    int direction = 0;        ///< of the steps that it accepts: +1, -1, or 0 if it accepts either
-    int aim = 0;              ///< the direction that it turns to now; 0: it isn't turning
-    Nanoseconds takes = 0;    ///< the earliest time of the next step, if it isn't busy
+    bool busy = false;      ///< a pulse is out; no step is taken until it has ended
+    bool stepped = false;   ///< it has played a step
+    int direction = 0;      ///< the direction of the steps that it accepts: +1, -1, or 0 for either
+    int aim = 0;            ///< the direction that it turns to now; 0: it isn't turning
+    Nanoseconds takes = 0;  ///< the earliest time of the next step, if it isn't busy
     Nanoseconds closest = 0;  ///< the same as far as it is known while it is busy
     Nanoseconds last = 0;     ///< the time of the last step
 

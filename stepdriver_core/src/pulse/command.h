@@ -37,11 +37,10 @@ struct Follow {
   bool slows = false;
   /// At its end it waits for the in-position outputs, if the channel has any.
   bool settles = false;
-  /// [microsteps] Of a full step: its steps may be late by ChannelConfig::late_steps of it. 0: only
-  /// by a quarter of an interval each.
+  /// [microsteps] A full step: steps may be late by ChannelConfig::late_steps of it. 0: each step
+  /// may only be late by a quarter of its interval.
   int full_step = 0;
-  /// @name Of an order from rest, for an axis with several motors; profiles that continue it keep
-  ///   these
+  /// @name Orders from rest to an axis with several motors; profiles that continue them keep these
   /// @{
   MotorSet still = 0;  ///< these motors make no steps
   /// Each motor stops at its own endstop, and the others continue. The motion ends as at an endstop
@@ -55,13 +54,13 @@ struct Follow {
 /// The marks of an output with a name along a path, for a motion along it that its axes follow. The
 /// engine refuses it with the motions of its command.
 struct FollowMarks {
-  std::size_t output = 0;    ///< by its number in the configuration
-  std::uint64_t serial = 0;  ///< of the orders for this output, above 0
+  std::size_t output = 0;    ///< the output's number in the configuration
+  std::uint64_t serial = 0;  ///< counts the orders for this output, above 0
   std::uint64_t group = 0;   ///< Follow::group of the path
   /// Live until the output reads a later order, or none, see OutputLineState::reads.
   const motion::Profile* along = nullptr;
   const motion::OutputMarks* marks = nullptr;
-  Nanoseconds delay = 0;  ///< of the axes behind the motion along the path
+  Nanoseconds delay = 0;  ///< by which the axes follow the motion along the path
   /// The path hasn't had the output yet: it begins with its first mark. Otherwise the order does
   /// nothing if the path's part has ended.
   bool begins = false;
@@ -76,7 +75,7 @@ struct FollowMarks {
 
 /// An order to the pulse thread. Serials rise by one on each channel.
 struct Command {
-  /// What it orders.
+  /// What the command orders.
   enum class Kind {
     kFollow,    ///< follow the profiles: all of them, or none if one can't be accepted
     kReserve,   ///< the chip's other pins are being written: make no step, ignore the fault line
@@ -93,7 +92,7 @@ struct Command {
   int channel = 0;         ///< for kReserve and kRelease, like all below
   std::uint64_t serial = 0;
   Nanoseconds ready = 0;  ///< for kRelease: clock time before which no step goes out
-  /// The position of the motor in the microsteps of a new mode.
+  /// The motor's position in the microsteps of a new mode.
   struct Scale {
     std::int64_t count = 0;
     double taken_up = 0.0;  ///< the part of the backlash that is taken up, see ChannelState

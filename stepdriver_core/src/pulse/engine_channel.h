@@ -21,11 +21,11 @@ struct EngineChannel;
 struct PlayedStep {
   int direction = 0;
   MotorSet still = 0;    ///< motors that didn't take part
-  Nanoseconds time = 0;  ///< by which it had happened
+  Nanoseconds time = 0;  ///< The step had gone out by this clock time.
 };
 
-/// Channels that depend on each other: that of an axis with motors of its own, alone, or those of
-/// axes that share motors, and of these motors.
+/// Channels that depend on each other. An axis with motors of its own has one channel, alone. Axes
+/// that share motors have theirs together with the channels of these motors.
 class Kin {
  public:
   Kin() = default;
@@ -42,7 +42,7 @@ class Kin {
   bool isRunning() const;   ///< such a motion has made a step
   bool isReserved() const;  ///< the pins of a chip are being written
   bool isBusy() const;      ///< a pulse is out, or a step is open
-  /// The axis whose chip has the motor of a channel: that of an axis itself.
+  /// The axis whose chip has the motor of a channel. For the channel of an axis it is this axis.
   EngineChannel* axisOf(EngineChannel& channel);
 
   std::vector<EngineChannel*> axes;  ///< what objects to a step, or ends, is theirs
@@ -51,7 +51,7 @@ class Kin {
   bool ends = false;                 ///< they are being ended
   std::size_t open = 0;              ///< steps that a port with a horizon has, and hasn't played
   bool drains = false;               ///< they have ended early, and steps are still open
-  bool unmade = false;  ///< with a horizon: they have ended before a step that was planned
+  bool unmade = false;  ///< They have ended before a step that was planned (with a horizon only).
 };
 
 /// The pulse thread's state of one channel: what comes next on it (timeline), whether that may go
@@ -101,7 +101,7 @@ struct EngineChannel {
   Kin* kin = nullptr;
   EngineChannel* next_of_kin = this;  // a ring through all of them
 
-  std::uint64_t group = 0;  // the last order's; 0: no group
+  std::uint64_t group = 0;  // the last order's group; 0: no group
   bool slows = false;       // the last order brings it to rest
   bool changed = false;     // it must be scheduled
   Nanoseconds at = 0;       // clock time of the next step
@@ -117,18 +117,19 @@ struct EngineChannel {
     last_steps_.reserve(kin->all.size());
     untold_.reserve(kMostUntold);
   }
-  /// These steps are over.
+  /// The steps that noteLastSteps() noted are over.
   bool isPlayed() const;
   /// When the next profile begins that is followed and hasn't been told; kNever: there is none.
   Nanoseconds tellAt() const { return untold_.empty() ? kNever : untold_.front().start; }
   /// Tells which profile is played at a motion time.
   void tell(Nanoseconds motion_now);
 
-  std::uint64_t put = 0;     // its steps that were handed over
-  std::uint64_t over = 0;    // those of them that were played or given back
-  bool is_fast = false;      // the motor can't stop at once after the last step that was played
-  bool ended_early = false;  // and steps of its kin are still open
-                             /// @}
+  std::uint64_t put = 0;   // counts the steps that were handed over
+  std::uint64_t over = 0;  // counts those of them that were played or given back
+  bool is_fast = false;    // The motor can't stop at once after the last step that was played.
+  /// Its motion has ended early, and steps of its kin are still open.
+  bool ended_early = false;
+  /// @}
 
  private:
   void takeUp(double of_backlash);

@@ -48,7 +48,7 @@ class EngineOutput {
   Clock& clock_;
   MarkFollower marks_;
   OutputLineState state_;
-  Nanoseconds tell_at_ = 0;  // clock time before which the controller isn't told again
+  Nanoseconds tell_at_ = 0;  // The controller isn't told again before this clock time.
   bool untold_ = false;
   Snapshot<OutputLineState> published_;
 };

@@ -8,13 +8,13 @@ namespace stepdriver::pulse {
 /// An output whose level changes at a fixed rate while the engine is served.
 struct HeartbeatLine {
   int output = -1;
-  Nanoseconds interval = 0;  ///< between two edges
+  Nanoseconds interval = 0;  ///< the time between two edges
 };
 
 /// When the next edge of a heartbeat is due, and its level. For the pulse thread.
 class Heartbeat {
  public:
-  /// @param line is low. @param now of the first edge.
+  /// @param line It is low. @param now The clock time of the first edge.
   Heartbeat(const HeartbeatLine& line, Nanoseconds now) : line_(line), due_(now) {}
 
   Nanoseconds due() const { return due_; }

@@ -14,7 +14,7 @@ namespace stepdriver::pulse {
 
 namespace {
 
-// Of axes that share motors: whether it concerns all of them, and not just one axis's own inputs.
+// Whether the reason concerns all axes that share motors, and not just one axis's own inputs.
 bool isOfAllAxes(EndReason reason) {
   switch (reason) {
     case EndReason::kEmergencyStop:
@@ -33,7 +33,7 @@ std::size_t sharedMotors(const std::vector<SharedAxes>& shared) {
   return motors;
 }
 
-// The motor of an axis that shares it: its lines and times, without what is the axis's.
+// The lines and times of a shared motor, without what belongs to the axis whose chip drives it.
 ChannelConfig motorOf(const ChannelConfig& axis) {
   ChannelConfig motor;
   motor.step = axis.step;

@@ -87,7 +87,8 @@ class PulseEngine : private StepPort::Listener {
               const std::vector<ChannelConfig>& channels, Nanoseconds max_lateness,
               std::optional<Signal> emergency_stop = {},
               const std::vector<SharedAxes>& shared = {});
-  /// The channels of a port: those of the axes, then those of the motors that axes share.
+  /// The channels of a port. Those of the axes come first, then those of the motors that axes
+  /// share.
   static std::vector<ChannelConfig> lanesOf(std::vector<ChannelConfig> channels,
                                             const std::vector<SharedAxes>& shared);
   ~PulseEngine() override;
@@ -168,7 +169,7 @@ class PulseEngine : private StepPort::Listener {
   LatenessFigures latenessLastSecond() const { return lateness_.lastSecond(clock_.now()); }
 
   std::size_t channels() const;
-  /// Of the port: a profile is refused if it begins sooner than this from now.
+  /// The port's horizon: a profile is refused if it begins sooner than this from now.
   Nanoseconds horizon() const { return horizon_; }
 
  private:
@@ -252,7 +253,7 @@ class PulseEngine : private StepPort::Listener {
   Clock& clock_;
   std::unique_ptr<StepPort> own_port_;
   StepPort& port_;
-  const Nanoseconds horizon_;  // of the port
+  const Nanoseconds horizon_;
   PinRing* ring_ = nullptr;
   const Nanoseconds max_lateness_;
   const std::optional<Signal> emergency_input_;
@@ -263,7 +264,7 @@ class PulseEngine : private StepPort::Listener {
       channels_;  // the axes' come first, then those of shared motors
   DueTree dues_;
   std::vector<std::unique_ptr<EngineOutput>> outputs_;
-  // Of one pass: the due channels, and those to schedule.
+  // The channels that are due in this pass, and those that it must schedule.
   std::vector<std::size_t> due_;
   std::vector<Channel*> changed_;
   std::uint64_t puts_ = 0;  // steps that were put ahead of time

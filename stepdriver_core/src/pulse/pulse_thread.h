@@ -36,8 +36,8 @@ class PulseThread {
   /// Ends the thread; no pulse goes out from then on.
   void stop();
 
-  /// The listener is told when the clock reaches this time: a virtual clock doesn't jump past it.
-  /// Replaces the previous alarm; kNever: no alarm. Safe from any thread.
+  /// Sets the alarm: the listener is told when the clock reaches this time, and a virtual clock
+  /// doesn't jump past it. Replaces the previous alarm; kNever: no alarm. Safe from any thread.
   void setAlarm(Nanoseconds time);
 
   /// Changes when a pass of the engine begins and when it ends; odd during a pass. Safe from any

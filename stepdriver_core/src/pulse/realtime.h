@@ -4,8 +4,8 @@ namespace stepdriver::pulse {
 
 /// The SCHED_FIFO priority of a thread that serves pulses on real lines.
 constexpr int kRealtimePriority = 50;
-/// That of threads whose work is short and must not wait while all processors are busy: the
-/// controller, and on a rig that keeps real time also the pulses.
+/// The SCHED_FIFO priority of threads whose work is short and must not wait while all processors
+/// are busy: the controller, and on a rig that keeps real time also the pulses.
 constexpr int kPromptPriority = 10;
 
 /// Requests SCHED_FIFO, and timers without slack, for the calling thread.

@@ -18,7 +18,7 @@ class Snapshot {
  public:
   Snapshot() { store(T{}); }
 
-  /// From one thread at a time.
+  /// To be called from one thread at a time.
   void store(const T& value) { storeFirst<sizeof(T)>(value); }
 
   /// Stores only the first bytes of a value: the rest is as it was when it was last stored. From
@@ -39,7 +39,7 @@ class Snapshot {
     sequence_.store(sequence + 2, std::memory_order_release);
   }
 
-  /// From any thread.
+  /// Safe from any thread.
   T load() const {
     std::array<std::uint64_t, kWords> words{};
     std::uint64_t before = 0;
