@@ -4,7 +4,7 @@ import math
 
 from std_srvs.srv import SetBool, Trigger
 
-from stepdriver.srv import Home, HomeAxes, MoveTo, SetOutput, SetPosition, SpeedOverride
+from stepdriver.srv import Home, HomeAxes, MoveTo, SetCurrent, SetOutput, SetPosition, SpeedOverride
 
 from .errors import Refusal
 from .units import in_page_units, position_text
@@ -61,6 +61,13 @@ def set_output(machine, message):
     return machine.driver.call("set_output", SetOutput, name=name, on=message.get("on") is True).message
 
 
+def set_current(machine, message):
+    """Of the chips of an axis on a UART, in motion and at rest [A rms]; 0: as configured."""
+    axis = axis_of(machine, message)
+    return machine.driver.call(f"{axis.name}/set_current", SetCurrent, run_current=number(message, "run"),
+                               hold_current=number(message, "hold")).message
+
+
 def speed_override(machine, message):
     return machine.driver.call("speed_override", SpeedOverride, factor=number(message, "factor")).message
 
@@ -75,6 +82,7 @@ COMMANDS = {
     "move": move,
     "set_zero": set_zero,
     "set_output": set_output,
+    "set_current": set_current,
     "speed_override": speed_override,
     "hold": trigger("hold"),
     "resume": trigger("resume"),

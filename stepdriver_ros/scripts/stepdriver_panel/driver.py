@@ -15,7 +15,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from stepdriver.msg import AxisStates, Endstops, IoStates, Jog
+from stepdriver.msg import AxisStates, DriverState, Endstops, IoStates, Jog
 
 from .errors import Refusal
 from .units import UNITS, in_page_units
@@ -125,14 +125,35 @@ class Driver:
         self.states, self.endstops, self.joints, self.engine = Newest(), Newest(), Newest(JOINT_STATES), Newest()
         self.io = Newest()  # of pairs: IoStates, and what to add to its stamps to get monotonic time [s]
         self._jog = rospy.Publisher(f"{self.name}/jog", Jog, queue_size=1, tcp_nodelay=True)
-        self._watched = []
+        self.chips = {}  # by axis with driver chips on a UART: the Newest of what they say
+        self._watched, self._chip_subscribers = None, []  # the subscribers, while there are viewers
+        self._lock = threading.Lock()
         # Always, so that a page shows what happened before it was opened; it is rare.
         self._log = rospy.Subscriber("/rosout", Log, self._take_log)
 
     def watch(self):
         """Subscribes to what the page shows. Without a viewer, nothing is received."""
+        with self._lock:
+            self._watched = self._subscribed()
+            self._watch_chips()
+
+    def watch_chips(self, axes):
+        """The axes whose chips are on a UART. It may wait for the master: call it in a thread."""
+        with self._lock:
+            self.chips = {axis: Newest() for axis in axes}
+            self._watch_chips()
+
+    def _watch_chips(self):
+        if self._watched is None:
+            return
+        for subscriber in self._chip_subscribers:
+            subscriber.unregister()
+        self._chip_subscribers = [
+            rospy.Subscriber(f"{self.name}/{axis}/driver", DriverState, newest.take) for axis, newest in self.chips.items()]
+
+    def _subscribed(self):
         space = rospy.names.namespace(self.name)
-        self._watched = [
+        subscribers = [
             rospy.Subscriber(f"{self.name}/axis_states", AxisStates, self.states.take),
             rospy.Subscriber(f"{self.name}/endstops", Endstops, self.endstops.take),
             rospy.Subscriber(f"{self.name}/io_states", IoStates, self._take_io),
@@ -140,12 +161,14 @@ class Driver:
         try:
             from diagnostic_msgs.msg import DiagnosticArray
         except ImportError:  # then the node doesn't publish them
-            return
-        self._watched.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._take_diagnostics))
+            return subscribers
+        return [*subscribers, rospy.Subscriber("/diagnostics", DiagnosticArray, self._take_diagnostics)]
 
     def unwatch(self):
-        watched, self._watched = self._watched, []
-        for subscriber in watched:
+        with self._lock:
+            subscribers = [*(self._watched or []), *self._chip_subscribers]
+            self._watched, self._chip_subscribers = None, []
+        for subscriber in subscribers:
             subscriber.unregister()
 
     def jog(self, axis, velocity):
@@ -201,7 +224,8 @@ class Axis:
         self.max_speed = parameters.get(f"max_speed_{key}_s", 0.0)
         self.has_homing = "homing" in parameters
         self.switches = {end: end in parameters.get("endstops", {}) for end in ("min", "max")}
+        self.has_chips = any("tmc" in part for part in (parameters, *parameters.get("motors", {}).values()))
 
     def shown(self):
         return {"name": self.name, "unit": self.unit, "min": self.limits[0], "max": self.limits[1],
-                "maxSpeed": self.max_speed, "homing": self.has_homing, "switches": self.switches}
+                "maxSpeed": self.max_speed, "homing": self.has_homing, "switches": self.switches, "chips": self.has_chips}

@@ -19,6 +19,7 @@ class Machine:
         self.recorder = {}
         self._source, self._states = None, []
         self._io_source, self._io = None, {"outputs": [], "inputs": []}
+        self._chip_sources, self._chips = {}, {}
 
     def age(self):
         """[s] of the newest state; infinite if there is none."""
@@ -89,6 +90,25 @@ class Machine:
                                message.input_name, message.input_active, message.input_changed,
                                message.input_error)]}
         return self._io
+
+    def chips(self):
+        """What the driver chips on a UART say, by axis: a list with one for each motor. The same object as before
+        if no message has come."""
+        sources = {axis: newest.message for axis, newest in self.driver.chips.items() if newest.message is not None}
+        if sources.keys() != self._chip_sources.keys() or any(
+                message is not self._chip_sources[axis] for axis, message in sources.items()):
+            self._chip_sources = sources
+            self._chips = {axis: [self._chip(message, i) for i in range(len(message.motor))]
+                           for axis, message in sources.items()}
+        return self._chips
+
+    @staticmethod
+    def _chip(message, i):
+        return {"motor": message.motor[i], "setUp": message.set_up[i],
+                "run": round(message.run_current[i], 3), "hold": round(message.hold_current[i], 3),
+                "present": round(message.present_current[i], 3), "celsius": message.at_least_celsius[i],
+                "hot": message.temperature_warning[i],
+                "load": None if message.load[i] < 0.0 else round(message.load[i], 2)}
 
     def override(self):
         message = self.driver.states.message

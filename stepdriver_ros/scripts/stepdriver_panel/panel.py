@@ -81,6 +81,7 @@ class Panel:
         self.publish_drawing()
         self.publish("states", self.machine.states())
         self.publish("io", self.machine.io())
+        self.publish("chips", self.machine.chips())
         self.publish("override", self.machine.override())
         self.publish("events", list(self.machine.driver.events))
         self._publish_control()
@@ -93,13 +94,14 @@ class Panel:
         self.publish("drawing", self.drawing.shown)
 
     async def _configure(self):
+        driver = self.machine.driver
         try:
-            parameters = await in_thread(self.machine.driver.parameters)
+            self.machine.configure(await in_thread(driver.parameters))
+            await in_thread(driver.watch_chips, [axis.name for axis in self.machine.axes.values() if axis.has_chips])
         except Exception as error:  # noqa: BLE001: the master may be gone in many ways
-            self.machine.driver.tell("error", f"the driver's parameters can't be read: {error}")
+            driver.tell("error", f"the driver's parameters can't be read: {error}")
             self._was_live = False
             return
-        self.machine.configure(parameters)
         self.jog.timeout = self.machine.jog_timeout
         self.publish("settings", self.machine.settings())
 

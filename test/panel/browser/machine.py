@@ -44,9 +44,10 @@ axes:
     homing: {switch: min, seek_speed_mm_s: 50.0, latch_speed_mm_s: 5.0, pull_off_mm: 4.0,
              offset_mm: -2.0, max_travel_mm: 250.0}
   y:
-    driver: a4988
+    driver: tmc2209
     joint: y_joint
     pins: {step: GPIO20, dir: GPIO21, enable: GPIO16}
+    tmc: {port: /dev/serial0, address: 0, sense_resistor_mohm: 110.0, run_current_a: 0.8, hold_current_a: 0.4}
     microsteps: 16
     steps_per_mm: 80.0
     max_speed_mm_s: 100.0

@@ -142,6 +142,35 @@ class Controls(OnTheMachine):
         wait_until(lambda: self.line("paper").startswith("active for "), "it is active")
         wait_until(lambda: self.line("paper") not in ("active for 0 s", "active for 1 s"), "its age grows")
 
+    def current(self, axis):
+        """What the page shows of the axis's driver on a UART."""
+        return self.page.find(self.page.axis(axis, '[data-field="chips"]')).text
+
+    def set_currents(self, axis, run, hold):
+        for name, current in (("run", run), ("hold", hold)):
+            field = self.page.find(self.page.axis(axis, f'.currents [name="{name}"]'))
+            field.clear()
+            field.send_keys(current)
+        self.page.click(self.page.axis(axis, ".currents button"))
+
+    def test_currents_of_a_driver_on_a_uart_are_shown_and_set(self):
+        wait_until(lambda: "A (0.80 A moving, 0.40 A at rest)" in self.current("y"),
+                   lambda: f"the configured currents; they are {self.current('y')!r}")
+        self.assertFalse(self.page.find(self.page.axis("x", ".chips")).is_displayed())
+        self.set_currents("y", "0.5", "0.1")
+        wait_until(lambda: "(0.49 A moving, 0.09 A at rest)" in self.current("y"),
+                   lambda: f"the new currents; they are {self.current('y')!r}")
+        self.set_currents("y", "5", "")
+        self.page.wait_said("to 0.8 A")
+        self.set_currents("y", "", "")
+        wait_until(lambda: "(0.80 A moving, 0.40 A at rest)" in self.current("y"), "as configured again")
+
+    def test_the_load_of_a_driver_on_a_uart_is_shown_after_a_motion(self):
+        for target in (0.06, 0.02):
+            machine.call("y/move_to", MoveTo, position=target, wait=True)
+        wait_until(lambda: "load of the last motion " in self.current("y"),
+                   lambda: f"the load is shown; there is {self.current('y')!r}")
+
     def test_setting_zero_asks_first(self):
         self.page.click(self.page.axis("y", '[data-by="1"]'))
         machine.at_rest()

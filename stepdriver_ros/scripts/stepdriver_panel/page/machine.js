@@ -9,6 +9,14 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+function chipText(chip) {
+  if (!chip.setUp) return "not set up yet";
+  const said = [`${chip.present.toFixed(2)} A (${chip.run.toFixed(2)} A moving, ${chip.hold.toFixed(2)} A at rest)`];
+  if (chip.load !== null) said.push(`load of the last motion ${Math.round(100 * chip.load)} %`);
+  if (chip.celsius > 0) said.push(`above ${chip.celsius} °C${chip.hot ? ": it will soon switch itself off" : ""}`);
+  return said.join(", ");
+}
+
 class AxisCard {
   constructor(settings, connection, held, jogShare) {
     this.settings = settings;
@@ -38,13 +46,14 @@ class AxisCard {
       button.addEventListener("click", () => connection.send("move", { axis: name, by: step }));
       steps.append(button);
     }
-    const form = this.root.querySelector("form");
+    const form = this.root.querySelector(".goto");
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       const input = form.querySelector("input");
       if (input.value !== "" && connection.send("move", { axis: name, to: Number(input.value) })) input.value = "";
     });
     this.#addButtons(connection);
+    this.#addCurrents(connection);
   }
 
   #addLimits() {
@@ -84,6 +93,33 @@ class AxisCard {
       button(what).addEventListener("click", act);
       button(what).setAttribute("aria-label", `${button(what).textContent}: ${name}`);
     }
+  }
+
+  #addCurrents(connection) {
+    const { name, chips } = this.settings;
+    for (const part of this.root.querySelectorAll(".chips")) part.hidden = !chips;
+    const form = this.root.querySelector(".currents");
+    for (const input of form.querySelectorAll("input")) {
+      input.setAttribute("aria-label", `current of ${name} ${input.name === "run" ? "moving" : "at rest"}, in ampere`);
+    }
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      const [run, hold] = form.querySelectorAll("input");
+      connection.send("set_current", { axis: name, run: Number(run.value), hold: Number(hold.value) });
+    });
+  }
+
+  // What the driver chips on a UART say, one for each motor.
+  showChips(chips) {
+    const list = this.fields.chips;
+    if (list.children.length !== 2 * chips.length) {
+      list.replaceChildren(...chips.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
+    }
+    chips.forEach((chip, i) => {
+      setText(list.children[2 * i], chip.motor ? `current of ${chip.motor}` : "current");
+      setText(list.children[2 * i + 1], chipText(chip));
+      list.children[2 * i + 1].className = chip.hot || !chip.setUp ? "warn" : "";
+    });
   }
 
   show(state) {
@@ -165,6 +201,10 @@ export class MachineScreen {
       box.append(name, state.remedy ? `. ${state.remedy}` : "");
       return box;
     }));
+  }
+
+  showChips(chips) {
+    for (const [name, list] of Object.entries(chips)) this.#cards.get(name)?.showChips(list);
   }
 
   showPositions(positions) {

@@ -81,9 +81,11 @@ const SHOW = {
     machine.configure(value);
     plots.configure(value);
     if (parts.states) machine.showStates(parts.states);
+    if (parts.chips) machine.showChips(parts.chips);
   },
   states: (value) => machine.showStates(value),
   io: (value) => io.show(value),
+  chips: (value) => machine.showChips(value),
   override: (value) => machine.showOverride(value),
   events: (value) => machine.showEvents(value),
   control: () => {},
