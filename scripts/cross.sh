@@ -118,7 +118,7 @@ unpack_board() {
     done
   [[ -x $1/bin/busybox && -n $(find "$1/boot" -name 'vmlinuz*') ]] && rm -rf "$work"
 }
-keep "$arch" unpack_packages libc6-dev libfmt-dev libgpiod-dev libgtest-dev libstdc++6 libyaml-cpp-dev
+keep "$arch" unpack_packages libc6-dev libfmt-dev libgpiod-dev libgtest-dev libstdc++6 libyaml-cpp-dev nlohmann-json3-dev zlib1g-dev
 sysroot=$unpacked
 
 # ---- its builds ----
@@ -168,7 +168,7 @@ make_board() {
   mkdir -p "$files"/{bin,dev,proc,sys,example}
   "$triplet-g++" --sysroot="$sysroot" -std=c++17 -O2 "$example/move_axis.cpp" -o "$files/example/move_axis" \
     -I "$root/stepdriver_core/include" "$cross"/core/libstepdriver_core{_yaml,}.a \
-    -lyaml-cpp -lfmt -lgpiod -pthread &&
+    -lyaml-cpp -lfmt -lgpiod -lz -pthread &&
     sed -e 's/backend: simulated/backend: libgpiod/' -e "s/GPIO17/9030000.pl061:$step/" \
       -e "s/GPIO27/9030000.pl061:$dir/" -e "s/GPIO22/9030000.pl061:$enable/" \
       "$example/axis.yaml" >"$files/example/axis.yaml" || return

@@ -36,11 +36,11 @@ install(FILES ${made_folder}/stepdriver_coreConfig.cmake
 # A static library contains no list of the libraries that it needs, so plain `pkg-config --libs` names
 # them too. Paths are relative to the file itself, so that the installed folder can be moved.
 file(RELATIVE_PATH pc_to_prefix /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
-set(pc_requires fmt)
+set(pc_requires "fmt, zlib")
 if(gpiod_major EQUAL 1)
-  set(pc_requires "fmt, libgpiod < 2")
+  set(pc_requires "fmt, zlib, libgpiod < 2")
 elseif(gpiod_major EQUAL 2)
-  set(pc_requires "fmt, libgpiod >= 2")
+  set(pc_requires "fmt, zlib, libgpiod >= 2")
 endif()
 get_target_property(library_type stepdriver_core TYPE)
 if(library_type STREQUAL "STATIC_LIBRARY")

@@ -26,12 +26,14 @@ SYSTEM_KEYS = {
     "libsystemd-dev": "libsystemd-dev",
     "liburdfdom-dev": "liburdfdom-dev",
     "libxml2": "libxml2-dev",
+    "nlohmann-json-dev": "nlohmann-json3-dev",
     "python3-aiohttp": "python3-aiohttp",
     "python3-matplotlib": "python3-matplotlib",
     "python3-shapely": "python3-shapely",
     "python3-yaml": "python3-yaml",
     "tmux": "tmux",
     "yaml-cpp": "libyaml-cpp-dev",
+    "zlib": "zlib1g-dev",
 }
 # Packages of noetic/distribution.yaml: their names are keys.
 ROS_KEYS = set(
