@@ -33,9 +33,7 @@ void simulatedSeconds(benchmark::State& state) {
   pulse::VirtualClock clock;
   sim::Rig rig(test::Bench::judged(test::Bench::rigAxes(axes), axes));
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
-  machine::MachineOptions options;
-  options.threaded = false;
-  machine::Machine machine(axes, backend, clock, options);
+  test::UnthreadedMachine machine(axes, backend, clock);
 
   double target = 0.0;
   const pulse::Nanoseconds begin = clock.now();

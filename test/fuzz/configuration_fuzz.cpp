@@ -14,9 +14,9 @@
 #include "fuzz/fuzz_input.h"
 #include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/setup/simulation.h"
 #include "stepdriver_core/yaml.h"
+#include "support/unthreaded_machine.h"
 
 // The input is a configuration file. It is refused with messages of one line, or every number in it
 // is within its bounds, and its machine starts on the rig and moves.
@@ -162,8 +162,7 @@ void startMachine(ros_node::NodeConfig config) {
   setup::Simulation simulation(config.axes, config.emergency_stop, config.motor_power,
                                config.simulation);
   machine::MachineOptions options = config.options();
-  options.threaded = false;
-  machine::Machine machine(config.axes, simulation.backend(), simulation.clock(), options);
+  test::UnthreadedMachine machine(config.axes, simulation.backend(), simulation.clock(), options);
   for (const auto& axis : machine.axes()) {
     const axis::AxisState state = axis->state();
     require(std::isfinite(state.position) && !state.moving, "an axis is at rest at the start");

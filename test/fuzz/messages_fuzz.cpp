@@ -84,7 +84,7 @@ class MachineOnRig {
  public:
   MachineOnRig() : bench_(axes()) {}
 
-  machine::Machine& machine() { return *bench_.machine; }
+  test::UnthreadedMachine& machine() { return *bench_.machine; }
   axis::Axis& x() { return bench_.axis("x"); }
 
   /// What a client asked for.

@@ -16,12 +16,6 @@ std::set<Session*>& sessions() {
   return *all;
 }
 
-machine::MachineOptions optionsOf(const setup::MachineConfig& config, bool threaded) {
-  machine::MachineOptions options = config.options();
-  options.threaded = threaded;
-  return options;
-}
-
 std::shared_ptr<OpenMachine> open(const setup::MachineConfig& config, bool threaded) {
   const py::gil_scoped_release without_gil;
   return std::make_shared<OpenMachine>(config, threaded);
@@ -30,9 +24,7 @@ std::shared_ptr<OpenMachine> open(const setup::MachineConfig& config, bool threa
 }  // namespace
 
 OpenMachine::OpenMachine(const setup::MachineConfig& config, bool threaded)
-    : threaded_(threaded),
-      hardware_(config),
-      machine_(config.axes, hardware_.backend(), hardware_.clock(), optionsOf(config, threaded)) {}
+    : threaded_(threaded), hardware_(config), machine_(config, hardware_, threaded) {}
 
 std::unique_lock<std::recursive_mutex> OpenMachine::turn() {
   std::unique_lock<std::recursive_mutex> lock(mutex_, std::defer_lock);

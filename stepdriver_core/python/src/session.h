@@ -14,6 +14,16 @@
 
 namespace stepdriver::python {
 
+/// A machine that has no threads if the caller wants that: then the calls serve the pulses.
+class ChosenMachine : public machine::Machine {
+ public:
+  ChosenMachine(const setup::MachineConfig& config, setup::Hardware& hardware, bool threaded)
+      : Machine(config.axes, hardware.backend(), hardware.clock(), config.options(),
+                threaded ? ServedBy::kThreads : ServedBy::kCallers) {}
+
+  using Machine::advance;
+};
+
 /// A machine with its lines and its clock, as long as it is open.
 class OpenMachine {
  public:
@@ -21,7 +31,7 @@ class OpenMachine {
   OpenMachine(const setup::MachineConfig& config, bool threaded);
 
   setup::Hardware& hardware() { return hardware_; }
-  machine::Machine& machine() { return machine_; }
+  ChosenMachine& machine() { return machine_; }
 
   /// Held during a call. A machine without threads has only one caller at a time; a signal handler
   /// of Python may call it from within a call.
@@ -34,7 +44,7 @@ class OpenMachine {
   const bool threaded_;
   std::shared_ptr<OpenMachine> itself_;
   setup::Hardware hardware_;
-  machine::Machine machine_;
+  ChosenMachine machine_;
   std::recursive_mutex mutex_;
 };
 

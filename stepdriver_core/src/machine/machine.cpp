@@ -51,8 +51,8 @@ constexpr double kLongestTimeout = 60.0;
 class Machine::Impl {
  public:
   Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
-       const MachineOptions& options)
-      : clock_(clock), disposer_(options.threaded), outputs_(options.outputs) {
+       const MachineOptions& options, bool threaded)
+      : clock_(clock), disposer_(threaded), outputs_(options.outputs) {
     checkConfiguration(configs, options);
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
@@ -87,7 +87,7 @@ class Machine::Impl {
       engine_->recordTo(recorder_->pulseRing());
     }
     Shell::Options shell_options;
-    shell_options.threaded = options.threaded;
+    shell_options.threaded = threaded;
     shell_options.write_timeout_ns = nanoseconds(options.write_timeout);
     shell_options.realtime = options.realtime;
     shell_options.on_motion = [this] {
@@ -103,14 +103,12 @@ class Machine::Impl {
     };
     shell_ = std::make_unique<Shell>(*controller_, *engine_, clock, lines_, wiring, shell_options);
     for (std::size_t i = 0; i < configs.size(); ++i) {
-      auto axis = std::make_unique<MachineAxis>(configs[i], i, wiring.motor_lines[i], *shell_,
-                                                *lines_, names_);
-      own_axes_.push_back(axis.get());
-      axes_.push_back(std::move(axis));
+      axes_.push_back(std::make_unique<axis::Axis>(std::make_unique<axis::Axis::Impl>(
+          axis::Axis::Impl{configs[i], i, wiring.motor_lines[i], *shell_, *lines_, names_})));
     }
     try {
       ask(*shell_, BringUp{});
-      if (keeper_) startKeeping(options.threaded);
+      if (keeper_) startKeeping(threaded);
     } catch (const Error&) {
       // Brakes take time: the lines are released only when they are engaged.
       powerDownQuietly();
@@ -126,19 +124,19 @@ class Machine::Impl {
     shell_->stop();
   }
 
-  MachineAxis& axis(const std::string& name) const {
-    for (MachineAxis* axis : own_axes_) {
-      if (axis->config().name == name) return *axis;
+  AxisId idOf(const std::string& name) const {
+    for (AxisId id = 0; id < axes_.size(); ++id) {
+      if (axes_[id]->config().name == name) return id;
     }
     throw Refused(fmt::format("there is no axis {} (axes: {})", name, allNames()));
   }
 
   std::string allNames() const {
-    return joinedText(own_axes_, [](const MachineAxis* axis) { return axis->config().name; });
+    return joinedText(axes_, [](const auto& axis) { return axis->config().name; });
   }
 
   CoordinatedMove moveLine(const motion::LineRequest& request) {
-    const std::vector<AxisId> axes = idsOf(axesOf(request.names));
+    const std::vector<AxisId> axes = idsOf((request.names));
     if (request.positions.size() != axes.size()) {
       throw Refused(fmt::format("there are {} names, but {} positions", axes.size(),
                                 request.positions.size()));
@@ -155,7 +153,7 @@ class Machine::Impl {
     std::vector<std::string> names;
     names.reserve(messages.size());
     for (const StreamMessage& message : messages) names.push_back(message.name);
-    return idsOf(axesOf(names));
+    return idsOf((names));
   }
 
   std::vector<std::string> jog(const std::vector<StreamMessage>& messages) {
@@ -238,7 +236,7 @@ class Machine::Impl {
 
   double pathDuration(const motion::PathRequest& request, const std::vector<double>& from) const {
     if (request.more_follows) throw Refused("a path is planned as a whole: no more may follow");
-    const std::vector<AxisId> axes = idsOf(axesOf(request.names));
+    const std::vector<AxisId> axes = idsOf((request.names));
     const auto now = shell_->snapshot();
     const std::vector<motion::PathAxis> facts = factsOf(*now, axes);
     const std::vector<motion::PathOrigin> origins =
@@ -368,7 +366,7 @@ class Machine::Impl {
   // Prepares a trajectory from the facts about its axes, and again if these have changed meanwhile.
   template <typename Prepare>
   CoordinatedMove follow(const std::vector<std::string>& names, const Prepare& prepare) {
-    const std::vector<AxisId> axes = idsOf(axesOf(names));
+    const std::vector<AxisId> axes = idsOf((names));
     const auto begun = shell_->snapshot();
     FollowTrajectory wanted{axes, nullptr, {}, std::nullopt};
     wanted.stops.reserve(axes.size());
@@ -438,32 +436,25 @@ class Machine::Impl {
     return origins;
   }
 
-  std::vector<MachineAxis*> axesOf(const std::vector<std::string>& names) const {
+  std::vector<AxisId> idsOf(const std::vector<std::string>& names) const {
     if (names.empty()) throw Refused("no axis is named (axes: " + allNames() + ")");
-    std::vector<MachineAxis*> axes;
+    std::vector<AxisId> ids;
     for (const std::string& name : names) {
-      axes.push_back(&axis(name));
-      if (std::find(axes.begin(), axes.end() - 1, axes.back()) != axes.end() - 1) {
+      ids.push_back(idOf(name));
+      if (std::find(ids.begin(), ids.end() - 1, ids.back()) != ids.end() - 1) {
         throw Refused("the axis " + name + " is named twice");
       }
     }
-    return axes;
+    return ids;
   }
 
-  std::vector<MachineAxis*> axesToHome(const std::vector<std::string>& names) const {
-    if (!names.empty()) return axesOf(names);
-    std::vector<MachineAxis*> axes;
-    for (MachineAxis* axis : own_axes_) {
-      if (axis->config().homing) axes.push_back(axis);
-    }
-    if (axes.empty()) throw Refused("no axis has homing configured (axes: " + allNames() + ")");
-    return axes;
-  }
-
-  static std::vector<AxisId> idsOf(const std::vector<MachineAxis*>& axes) {
+  std::vector<AxisId> axesToHome(const std::vector<std::string>& names) const {
+    if (!names.empty()) return idsOf(names);
     std::vector<AxisId> ids;
-    ids.reserve(axes.size());
-    for (const MachineAxis* axis : axes) ids.push_back(axis->id());
+    for (AxisId id = 0; id < axes_.size(); ++id) {
+      if (axes_[id]->config().homing) ids.push_back(id);
+    }
+    if (ids.empty()) throw Refused("no axis has homing configured (axes: " + allNames() + ")");
     return ids;
   }
 
@@ -481,7 +472,7 @@ class Machine::Impl {
   std::optional<CoordinatedResult> result(const CoordinatedMove& move) const {
     std::vector<axis::MoveResult> results;
     for (const CoordinatedMove::Member& member : move.members) {
-      const auto own = axis(member.axis).result(member.move);
+      const auto own = axes_[idOf(member.axis)]->result(member.move);
       if (!own) return std::nullopt;
       results.push_back(*own);
     }
@@ -502,8 +493,8 @@ class Machine::Impl {
   StateKeeper::Memories memories() const {
     StateKeeper::Memories memories;
     const auto snapshot = shell_->snapshot();
-    for (const MachineAxis* axis : own_axes_) {
-      memories.emplace(axis->config().name, snapshot->axes.at(axis->id()).memory);
+    for (AxisId id = 0; id < axes_.size(); ++id) {
+      memories.emplace(axes_[id]->config().name, snapshot->axes.at(id).memory);
     }
     return memories;
   }
@@ -518,12 +509,12 @@ class Machine::Impl {
 
   void startKeeping(bool threaded) {
     const StateKeeper::Loaded loaded = keeper_->load();
-    for (const MachineAxis* axis : own_axes_) {
-      const auto found = loaded.state.axes.find(axis->config().name);
+    for (AxisId id = 0; id < axes_.size(); ++id) {
+      const auto found = loaded.state.axes.find(axes_[id]->config().name);
       if (found != loaded.state.axes.end()) {
-        ask(*shell_, RestorePosition{axis->id(), found->second, loaded.state.clean, loaded.source});
+        ask(*shell_, RestorePosition{id, found->second, loaded.state.clean, loaded.source});
       } else {
-        ask(*shell_, NotePosition{axis->id(), loaded.why_none});
+        ask(*shell_, NotePosition{id, loaded.why_none});
       }
     }
     keeper_->start([this] { return memories(); }, threaded);
@@ -547,7 +538,6 @@ class Machine::Impl {
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<Controller> controller_;
   std::unique_ptr<Shell> shell_;
-  std::vector<MachineAxis*> own_axes_;
   std::vector<std::unique_ptr<axis::Axis>> axes_;
   std::unique_ptr<StateKeeper> keeper_;
   std::atomic<bool> shut_{false};
@@ -576,13 +566,20 @@ CoordinatedResult combinedResult(const std::vector<axis::MoveResult>& members) {
 
 Machine::Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                  pulse::Clock& clock, const MachineOptions& options)
-    : impl_(std::make_unique<Impl>(axes, backend, clock, options)) {}
+    : Machine(axes, backend, clock, options, ServedBy::kThreads) {}
+
+Machine::Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
+                 pulse::Clock& clock, const MachineOptions& options, ServedBy served_by)
+    : impl_(
+          std::make_unique<Impl>(axes, backend, clock, options, served_by == ServedBy::kThreads)) {}
 
 Machine::~Machine() = default;
 
 const std::vector<std::unique_ptr<axis::Axis>>& Machine::axes() const { return impl_->axes_; }
 
-axis::Axis& Machine::axis(const std::string& name) const { return impl_->axis(name); }
+axis::Axis& Machine::axis(const std::string& name) const {
+  return *impl_->axes_[impl_->idOf(name)];
+}
 
 const std::optional<pulse::Capability>& Machine::capability() const { return impl_->capability_; }
 
@@ -595,11 +592,11 @@ void Machine::resume() { ask(*impl_->shell_, Resume{}); }
 std::vector<axis::HomingResult> Machine::home(const std::vector<std::string>& names,
                                               const std::function<bool()>& cancelled) {
   checkHoming(names);
-  return homeInOrder(*impl_->shell_, impl_->axesToHome(names), cancelled);
+  return homeInOrder(*impl_->shell_, impl_->axes_, impl_->axesToHome(names), cancelled);
 }
 
 void Machine::checkHoming(const std::vector<std::string>& names) const {
-  ask(*impl_->shell_, Home{Impl::idsOf(impl_->axesToHome(names)), true});
+  ask(*impl_->shell_, Home{impl_->axesToHome(names), true});
 }
 
 void Machine::setSpeedOverride(double factor) {

@@ -30,94 +30,6 @@ activity::Reply valueOf(activity::Reply reply) {
   throw Error(reply.failure->text);
 }
 
-MachineAxis::MachineAxis(config::AxisConfig config, AxisId id, const motor::MotorLines& motor_lines,
-                         Shell& shell, gpio::Lines& lines, const axis::LineNames& names)
-    : config_(std::move(config)),
-      id_(id),
-      motor_lines_(motor_lines),
-      shell_(shell),
-      lines_(lines),
-      names_(names) {}
-
-// ---- motions ----
-
-axis::Move MachineAxis::moveTo(double position, bool relative, double velocity, bool shortest) {
-  const auto reply = ask(shell_, MoveTo{id_, position, relative, velocity, shortest});
-  return std::get<std::vector<axis::Move>>(reply.value).front();
-}
-
-axis::MovePlan MachineAxis::plan(double position, bool relative, double velocity, bool shortest) {
-  auto reply = ask(shell_, PlanMove{{id_, position, relative, velocity, shortest}});
-  return std::get<axis::MovePlan>(std::move(reply.value));
-}
-
-axis::Move MachineAxis::moveRounds(double rounds, double velocity) {
-  const auto reply = ask(shell_, MoveRounds{id_, rounds, velocity});
-  return std::get<std::vector<axis::Move>>(reply.value).front();
-}
-
-std::optional<axis::MoveResult> MachineAxis::result(const axis::Move& move) const {
-  if (move.outcome == nullptr) return std::nullopt;
-  auto ended = move.outcome->get();
-  if (ended) {
-    shell_.awaitTurn();
-    return ended;
-  }
-  // Nobody waits until the chip answers.
-  std::string why = shell_.whyHung();
-  if (why.empty()) return std::nullopt;
-  return axis::MoveResult{axis::MoveEnd::kFault, std::move(why), state().position, 0.0};
-}
-
-axis::MoveResult MachineAxis::wait(const axis::Move& move) {
-  requireAccepted(move);
-  std::optional<axis::MoveResult> ended;
-  shell_.wait([&] {
-    ended = result(move);
-    return ended.has_value();
-  });
-  return *ended;
-}
-
-std::optional<axis::MoveResult> MachineAxis::waitFor(const axis::Move& move,
-                                                     std::chrono::nanoseconds longest) {
-  requireAccepted(move);
-  std::optional<axis::MoveResult> ended;
-  const auto has_ended = [&] {
-    ended = result(move);
-    return ended.has_value();
-  };
-  shell_.waitFor(has_ended, longest);
-  return ended;
-}
-
-void MachineAxis::requireAccepted(const axis::Move& move) const {
-  if (move.outcome != nullptr) return;
-  throw Refused(config().name + ": the move was only planned: it has no end to wait for");
-}
-
-void MachineAxis::jog(double velocity, std::optional<std::uint64_t> unless_stopped_since) {
-  ask(shell_, Jog{id_, velocity, unless_stopped_since});
-}
-
-void MachineAxis::setLimits(const axis::AxisLimits& wanted) { ask(shell_, SetLimits{id_, wanted}); }
-
-axis::AxisLimits MachineAxis::limits() const { return shell_.snapshot()->axes.at(id_).limits; }
-
-void MachineAxis::setCurrent(double run, double hold) { ask(shell_, SetCurrent{id_, run, hold}); }
-
-void MachineAxis::stop() { ask(shell_, StopAxis{id_}); }
-
-void MachineAxis::stop(const axis::Move& move) { ask(shell_, StopMove{id_, move.id}); }
-
-// ---- homing ----
-
-axis::HomingResult MachineAxis::home(const std::function<bool()>& cancelled) {
-  return homeTogether(shell_, {id_}, cancelled).front();
-}
-
-void MachineAxis::checkHoming() const { ask(shell_, Home{{id_}, true}); }
-
 std::vector<axis::HomingResult> homeTogether(Shell& shell, const std::vector<AxisId>& axes,
                                              const std::function<bool()>& cancelled) {
   const auto reply = ask(shell, Home{axes, false});
@@ -141,35 +53,34 @@ std::vector<axis::HomingResult> homeTogether(Shell& shell, const std::vector<Axi
   return results;
 }
 
-std::vector<axis::HomingResult> homeInOrder(Shell& shell, const std::vector<MachineAxis*>& axes,
+std::vector<axis::HomingResult> homeInOrder(Shell& shell,
+                                            const std::vector<std::unique_ptr<axis::Axis>>& all,
+                                            const std::vector<AxisId>& wanted,
                                             const std::function<bool()>& cancelled) {
   std::map<int, std::vector<AxisId>> groups;
-  for (const MachineAxis* axis : axes) {
-    groups[axis->config().homing->order].push_back(axis->id());
-  }
+  for (const AxisId id : wanted) groups[all[id]->config().homing->order].push_back(id);
   const auto not_homed = [&](const std::vector<AxisId>& group, axis::HomingEnd end,
                              const std::string& why) {
     std::vector<axis::HomingResult> results;
-    for (const MachineAxis* axis : axes) {
-      if (std::find(group.begin(), group.end(), axis->id()) == group.end()) continue;
+    for (const AxisId id : group) {
       axis::HomingResult result;
-      result.axis = axis->config().name;
+      result.axis = all[id]->config().name;
       result.end = end;
       result.message = fmt::format("{} isn't homed: {}", result.axis, why);
-      result.position = axis->state().position;
+      result.position = all[id]->state().position;
       results.push_back(std::move(result));
     }
     return results;
   };
-  std::vector<axis::HomingResult> all;
+  std::vector<axis::HomingResult> ended;
   for (const auto& [order, group] : groups) {
-    const auto failed = std::find_if(all.begin(), all.end(), [](const axis::HomingResult& result) {
-      return result.end != axis::HomingEnd::kHomed;
-    });
+    const auto failed = std::find_if(
+        ended.begin(), ended.end(),
+        [](const axis::HomingResult& result) { return result.end != axis::HomingEnd::kHomed; });
     std::vector<axis::HomingResult> results;
-    if (failed != all.end()) {
+    if (failed != ended.end()) {
       results = not_homed(group, failed->end, failed->axis + " comes before it, and isn't homed");
-    } else if (all.empty()) {
+    } else if (ended.empty()) {
       results = homeTogether(shell, group, cancelled);
     } else {
       // Others have moved by now: if this one can't begin anymore, that is its result.
@@ -179,49 +90,149 @@ std::vector<axis::HomingResult> homeInOrder(Shell& shell, const std::vector<Mach
         results = not_homed(group, axis::HomingEnd::kFailed, refused.what());
       }
     }
-    all.insert(all.end(), results.begin(), results.end());
+    ended.insert(ended.end(), results.begin(), results.end());
   }
-  return all;
+  return ended;
 }
 
-// ---- the driver chip ----
+}  // namespace stepdriver::machine
 
-void MachineAxis::enable(bool on) { ask(shell_, Enable{{id_}, on}); }
+namespace stepdriver::axis {
 
-void MachineAxis::sleep(bool asleep) { ask(shell_, Sleep{id_, asleep}); }
-
-void MachineAxis::reset() { ask(shell_, Reset{id_}); }
-
-void MachineAxis::setMicrosteps(int microsteps) { ask(shell_, SetMicrosteps{id_, microsteps}); }
-
-void MachineAxis::setPosition(double position) { ask(shell_, SetPosition{id_, position}); }
-
-// ---- state ----
-
-axis::AxisState MachineAxis::state() const { return shell_.state(id_); }
-
-double MachineAxis::peakRate() const { return shell_.peakRate(id_); }
-
-axis::EndstopState MachineAxis::endstops() const {
-  return {endstopActive(false), endstopActive(true)};
+activity::Reply Axis::Impl::ask(machine::Request request) const {
+  return machine::ask(shell, std::move(request));
 }
 
-std::optional<bool> MachineAxis::endstopActive(bool at_max) const {
+std::optional<MoveResult> Axis::Impl::result(const Move& move) const {
+  if (move.outcome == nullptr) return std::nullopt;
+  auto ended = move.outcome->get();
+  if (ended) {
+    shell.awaitTurn();
+    return ended;
+  }
+  // Nobody waits until the chip answers.
+  std::string why = shell.whyHung();
+  if (why.empty()) return std::nullopt;
+  return MoveResult{MoveEnd::kFault, std::move(why), shell.state(id).position, 0.0};
+}
+
+void Axis::Impl::requireAccepted(const Move& move) const {
+  if (move.outcome != nullptr) return;
+  throw Refused(config.name + ": the move was only planned: it has no end to wait for");
+}
+
+std::optional<bool> Axis::Impl::endstopActive(bool at_max) const {
   std::optional<bool> active;
-  for (std::size_t i = 0; i < config_.motors(); ++i) {
-    const config::MotorConfig& motor = config_.motorAt(i);
-    const motor::ChipLines& own = motor_lines_.motorAt(i);
+  for (std::size_t i = 0; i < config.motors(); ++i) {
+    const config::MotorConfig& motor = config.motorAt(i);
+    const motor::ChipLines& own = motor_lines.motorAt(i);
     const auto& endstop = at_max ? motor.endstop_max : motor.endstop_min;
     if (!endstop) continue;
     const int line = at_max ? own.endstop_max : own.endstop_min;
-    const int level = lines_.read(line);
+    const int level = lines.read(line);
     if (level < 0) {
-      throw GpioError(config_.name + ": " +
-                      axis::lineFailureText({-level, line, true}, config_, motor_lines_, names_));
+      throw GpioError(config.name + ": " +
+                      lineFailureText({-level, line, true}, config, motor_lines, names));
     }
     active = active.value_or(false) || (level != 0) == endstop->active_level;
   }
   return active;
 }
 
-}  // namespace stepdriver::machine
+Axis::Axis(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Axis::~Axis() = default;
+
+const config::AxisConfig& Axis::config() const { return impl_->config; }
+
+// ---- motions ----
+
+Move Axis::moveTo(double position, bool relative, double velocity, bool shortest) {
+  const auto reply = impl_->ask(machine::MoveTo{impl_->id, position, relative, velocity, shortest});
+  return std::get<std::vector<Move>>(reply.value).front();
+}
+
+MovePlan Axis::plan(double position, bool relative, double velocity, bool shortest) {
+  auto reply = impl_->ask(machine::PlanMove{{impl_->id, position, relative, velocity, shortest}});
+  return std::get<MovePlan>(std::move(reply.value));
+}
+
+Move Axis::moveRounds(double rounds, double velocity) {
+  const auto reply = impl_->ask(machine::MoveRounds{impl_->id, rounds, velocity});
+  return std::get<std::vector<Move>>(reply.value).front();
+}
+
+MoveResult Axis::wait(const Move& move) {
+  impl_->requireAccepted(move);
+  std::optional<MoveResult> ended;
+  impl_->shell.wait([&] {
+    ended = impl_->result(move);
+    return ended.has_value();
+  });
+  return *ended;
+}
+
+std::optional<MoveResult> Axis::result(const Move& move) const { return impl_->result(move); }
+
+std::optional<MoveResult> Axis::waitFor(const Move& move, std::chrono::nanoseconds longest) {
+  impl_->requireAccepted(move);
+  std::optional<MoveResult> ended;
+  const auto has_ended = [&] {
+    ended = impl_->result(move);
+    return ended.has_value();
+  };
+  impl_->shell.waitFor(has_ended, longest);
+  return ended;
+}
+
+void Axis::jog(double velocity, std::optional<std::uint64_t> unless_stopped_since) {
+  impl_->ask(machine::Jog{impl_->id, velocity, unless_stopped_since});
+}
+
+void Axis::setLimits(const AxisLimits& wanted) {
+  impl_->ask(machine::SetLimits{impl_->id, wanted});
+}
+
+AxisLimits Axis::limits() const { return impl_->shell.snapshot()->axes.at(impl_->id).limits; }
+
+void Axis::setCurrent(double run, double hold) {
+  impl_->ask(machine::SetCurrent{impl_->id, run, hold});
+}
+
+void Axis::stop() { impl_->ask(machine::StopAxis{impl_->id}); }
+
+void Axis::stop(const Move& move) { impl_->ask(machine::StopMove{impl_->id, move.id}); }
+
+// ---- homing ----
+
+HomingResult Axis::home(const std::function<bool()>& cancelled) {
+  return machine::homeTogether(impl_->shell, {impl_->id}, cancelled).front();
+}
+
+void Axis::checkHoming() const { impl_->ask(machine::Home{{impl_->id}, true}); }
+
+// ---- the driver chip ----
+
+void Axis::enable(bool on) { impl_->ask(machine::Enable{{impl_->id}, on}); }
+
+void Axis::sleep(bool asleep) { impl_->ask(machine::Sleep{impl_->id, asleep}); }
+
+void Axis::reset() { impl_->ask(machine::Reset{impl_->id}); }
+
+void Axis::setMicrosteps(int microsteps) {
+  impl_->ask(machine::SetMicrosteps{impl_->id, microsteps});
+}
+
+void Axis::setPosition(double position) { impl_->ask(machine::SetPosition{impl_->id, position}); }
+
+// ---- state ----
+
+AxisState Axis::state() const { return impl_->shell.state(impl_->id); }
+
+double Axis::peakRate() const { return impl_->shell.peakRate(impl_->id); }
+
+EndstopState Axis::endstops() const {
+  return {impl_->endstopActive(false), impl_->endstopActive(true)};
+}
+
+}  // namespace stepdriver::axis

@@ -11,54 +11,27 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/gpio/lines.h"
 
-namespace stepdriver::machine {
+namespace stepdriver::axis {
 
-/// An axis as its clients see it: each command is a request to the controller; readers use the last
-/// snapshot and the engine's count.
-class MachineAxis : public axis::Axis {
- public:
-  /// @param shell, lines, names outlive the axis.
-  MachineAxis(config::AxisConfig config, AxisId id, const motor::MotorLines& motor_lines,
-              Shell& shell, gpio::Lines& lines, const axis::LineNames& names);
+/// What an axis needs to be as its clients see it: each command is a request to the controller;
+/// readers use the last snapshot and the engine's count.
+struct Axis::Impl {
+  const config::AxisConfig config;
+  const machine::AxisId id;
+  const motor::MotorLines motor_lines;
+  machine::Shell& shell;  // this and the following outlive the axis
+  gpio::Lines& lines;
+  const LineNames& names;
 
-  AxisId id() const { return id_; }
-
-  const config::AxisConfig& config() const override { return config_; }
-  axis::Move moveTo(double position, bool relative, double velocity, bool shortest) override;
-  axis::MovePlan plan(double position, bool relative, double velocity, bool shortest) override;
-  axis::Move moveRounds(double rounds, double velocity) override;
-  std::optional<axis::MoveResult> result(const axis::Move& move) const override;
-  axis::MoveResult wait(const axis::Move& move) override;
-  std::optional<axis::MoveResult> waitFor(const axis::Move& move,
-                                          std::chrono::nanoseconds longest) override;
-  void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since) override;
-  void setLimits(const axis::AxisLimits& wanted) override;
-  axis::AxisLimits limits() const override;
-  void setCurrent(double run, double hold) override;
-  void stop() override;
-  void stop(const axis::Move& move) override;
-  axis::HomingResult home(const std::function<bool()>& cancelled) override;
-  void checkHoming() const override;
-  void enable(bool on) override;
-  void sleep(bool asleep) override;
-  void reset() override;
-  void setMicrosteps(int microsteps) override;
-  void setPosition(double position) override;
-  axis::AxisState state() const override;
-  double peakRate() const override;
-  axis::EndstopState endstops() const override;
-
- private:
-  void requireAccepted(const axis::Move& move) const;
+  activity::Reply ask(machine::Request request) const;
+  std::optional<MoveResult> result(const Move& move) const;
+  void requireAccepted(const Move& move) const;
   std::optional<bool> endstopActive(bool at_max) const;
-
-  const config::AxisConfig config_;
-  const AxisId id_;
-  const motor::MotorLines motor_lines_;
-  Shell& shell_;
-  gpio::Lines& lines_;
-  const axis::LineNames& names_;
 };
+
+}  // namespace stepdriver::axis
+
+namespace stepdriver::machine {
 
 /// Returns a successful answer. @throw Refused, GpioError, Error
 activity::Reply valueOf(activity::Reply reply);
@@ -71,7 +44,11 @@ std::vector<axis::HomingResult> homeTogether(Shell& shell, const std::vector<Axi
                                              const std::function<bool()>& cancelled);
 
 /// Homes axes by HomingConfig::order. If one fails, those that come later aren't homed.
-std::vector<axis::HomingResult> homeInOrder(Shell& shell, const std::vector<MachineAxis*>& axes,
+///
+/// @param all of the machine. @param wanted those to home.
+std::vector<axis::HomingResult> homeInOrder(Shell& shell,
+                                            const std::vector<std::unique_ptr<axis::Axis>>& all,
+                                            const std::vector<AxisId>& wanted,
                                             const std::function<bool()>& cancelled);
 
 }  // namespace stepdriver::machine

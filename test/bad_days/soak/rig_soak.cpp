@@ -60,8 +60,8 @@ class RigSoak {
         rig_(test::Bench::rigAxes(axes_)),
         backend_(rig_, [this] { return clock_.now(); }) {
     machine::MachineOptions machine_options;
-    machine_options.threaded = options.clients > 0;
-    machine_ = std::make_unique<machine::Machine>(axes_, backend_, clock_, machine_options);
+    machine_ = std::make_unique<test::UnthreadedMachine>(axes_, backend_, clock_, machine_options,
+                                                         options.clients > 0);
     for (int i = 0; i < std::max(1, options.clients); ++i) {
       commands_.emplace_back(*machine_, kNames, options.seed * 1000 + static_cast<unsigned>(i));
     }
@@ -177,7 +177,7 @@ class RigSoak {
   const std::vector<config::AxisConfig> axes_;
   sim::Rig rig_;
   gpio::SimulatedBackend backend_;
-  std::unique_ptr<machine::Machine> machine_;
+  std::unique_ptr<test::UnthreadedMachine> machine_;
   std::vector<RandomCommands> commands_;
   std::mutex mutex_;
   Findings findings_;

@@ -320,10 +320,8 @@ TEST(Brake, HoldsTheLoadIfTheMachineCantBegin) {
   sim::Rig rig(loadedRig(axes));
   pulse::VirtualClock clock;
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
-  machine::MachineOptions options;
-  options.threaded = false;
   rig.failWrites("y.enable", 0, EIO);
-  EXPECT_THROW(machine::Machine(axes, backend, clock, options), GpioError);
+  EXPECT_THROW(test::UnthreadedMachine(axes, backend, clock), GpioError);
   rig.setInput("nothing", false, clock.now() + 1'000 * kMillisecond);
   EXPECT_FALSE(rig.report("z").energized);
   EXPECT_EQ(rig.report("z").fell, 0.0);

@@ -363,9 +363,7 @@ TEST(HomingWithoutEdges, KnowsTheTriggerPointToAStepByTheCount) {
   SilentRig rig(Bench::rigAxes({config}));
   pulse::VirtualClock clock;
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
-  machine::MachineOptions options;
-  options.threaded = false;
-  machine::Machine machine({config}, backend, clock, options);
+  test::UnthreadedMachine machine({config}, backend, clock);
   const HomingResult result = machine.axis("x").home();
   EXPECT_EQ(result.end, HomingEnd::kHomed) << result.message;
   EXPECT_NEAR(result.position, rig.report("x").carriage / 1000.0, kStep);

@@ -327,10 +327,9 @@ TEST(CheckConfiguration, KnowsTheRulesOfAConfigurationFileForOptionsToo) {
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
   for (const WrongOption& wrong : wrongs_of_options) {
     MachineOptions options;
-    options.threaded = false;
     wrong.change(options);
     try {
-      const machine::Machine made(goodAxes(), backend, clock, options);
+      const test::UnthreadedMachine made(goodAxes(), backend, clock, options);
       ADD_FAILURE() << wrong.issue;
     } catch (const ConfigError& error) {
       EXPECT_NE(std::string(error.what()).find(wrong.issue), std::string::npos) << error.what();

@@ -120,9 +120,7 @@ TEST(ChipFaultAtTheStart, LetsTheMachineStartAtFaultAndSendsNoPulse) {
   pulse::VirtualClock clock(0.0);
   rig.setInput("x.fault", false, clock.now());
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
-  machine::MachineOptions options;
-  options.threaded = false;
-  machine::Machine machine({config}, backend, clock, options);
+  test::UnthreadedMachine machine({config}, backend, clock);
   axis::Axis& x = machine.axis("x");
   machine.advance(0.1);  // the chip wakes
   machine.advance(0.1);

@@ -129,9 +129,8 @@ TEST(EmergencyStopInputAtStart, FindsEveryAxisAtFaultAndEnergizesNone) {
     pulse::VirtualClock clock;
     gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
     machine::MachineOptions options = withInput(active_level);
-    options.threaded = false;
     rig.setInput(kStopLine, active_level, 0);
-    machine::Machine machine(axes, backend, clock, options);
+    test::UnthreadedMachine machine(axes, backend, clock, options);
     for (const auto& axis : machine.axes()) {
       EXPECT_EQ(axis->state().fault, "emergency stop input");
       EXPECT_FALSE(axis->state().enabled);

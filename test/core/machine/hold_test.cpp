@@ -36,7 +36,7 @@ class Hold : public testing::Test {
     for (const char* name : {"x", "y", "z"}) EXPECT_EQ(violationsOf(bench->report(name)), "");
   }
 
-  machine::Machine& machine() { return *bench->machine; }
+  test::UnthreadedMachine& machine() { return *bench->machine; }
   axis::Axis& axis(const std::string& name) { return bench->axis(name); }
 
   void expectHeld() {

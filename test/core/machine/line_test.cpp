@@ -54,7 +54,7 @@ class Line : public testing::Test {
     for (const auto& axis : machine().axes()) axis->setPosition(0.0);
   }
 
-  machine::Machine& machine() { return *bench->machine; }
+  test::UnthreadedMachine& machine() { return *bench->machine; }
   CoordinatedMove start(const motion::LineRequest& request) { return machine().moveLine(request); }
   double position(const std::string& name) { return bench->axis(name).state().position; }
   void advance(double seconds) { machine().advance(seconds); }

@@ -30,9 +30,8 @@ TEST(SlidTime, OfSecondsLosesNoStepBunchesNoneAndIsInTheDuration) {
     return ++waits % 50 == 0 ? 200'000'000 : 0;
   };
   machine::MachineOptions options;
-  options.threaded = false;
   options.late_steps = 0.0;
-  machine::Machine machine({linearAxis("x")}, backend, clock, options);
+  test::UnthreadedMachine machine({linearAxis("x")}, backend, clock, options);
   clock.spun = clock.slept = late;
   axis::Axis& x = machine.axis("x");
   // At a speed from which the motor can start again: 800 steps/s for a second.

@@ -176,7 +176,6 @@ TEST_F(MotorPower, StaysIfRecoverComesBeforeItHasGone) {
 
 TEST_F(MotorPower, IsNotSwitchedOnByAnEmergencyStopThatComesWhileItComes) {
   for (config::AxisConfig& axis : axes) axis.enable_on_start = false;
-  options.threaded = false;
   begin();
   // The button is pressed before: the power isn't wanted at all.
   bench->rig.setInput("button", true, bench->clock.now());
@@ -192,13 +191,12 @@ TEST_F(MotorPower, IsNotSwitchedOnByAnEmergencyStopThatComesWhileItComes) {
 
 TEST_F(MotorPower, IsOffAtTheStartWhileTheButtonIsPressed) {
   std::vector<sim::RigAxisSpec> rig = Bench::rigAxes(axes);
-  options.threaded = false;
   pulse::VirtualClock clock;
   auto trace = std::make_shared<sim::MemoryTrace>();
   sim::Rig own(rig, trace, {}, Bench::motorPowerOf(options));
   own.setInput("button", true, 0);
   gpio::SimulatedBackend backend(own, [&clock] { return clock.now(); });
-  machine::Machine machine(axes, backend, clock, options);
+  test::UnthreadedMachine machine(axes, backend, clock, options);
   machine.advance(1.0);
   EXPECT_TRUE(trace->times("machine", "motor_power", true).empty());
   own.setInput("button", false, clock.now());
@@ -249,12 +247,11 @@ TEST_F(MotorPower, WaitsForItsFeedback) {
 
 TEST_F(MotorPower, ThatDoesNotComeAtTheStartLeavesAMachineAtFaultThatRecovers) {
   addFeedback();
-  options.threaded = false;
   pulse::VirtualClock clock;
   sim::Rig own(Bench::rigAxes(axes), nullptr, {}, Bench::motorPowerOf(options));
   own.stickMotorPower(false, 0);
   gpio::SimulatedBackend backend(own, [&clock] { return clock.now(); });
-  machine::Machine machine(axes, backend, clock, options);
+  test::UnthreadedMachine machine(axes, backend, clock, options);
   EXPECT_NE(machine.axis("y").state().fault.find("the motor power isn't there"), std::string::npos);
   EXPECT_FALSE(machine.axis("y").state().enabled);
   EXPECT_THROW(machine.axis("y").enable(true), Error);

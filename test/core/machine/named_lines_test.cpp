@@ -171,12 +171,11 @@ TEST_F(NamedLines, OutputsAreSafeAfterTheButtonAndAFaultOfOneAxis) {
 
 TEST_F(NamedLines, NothingIsSwitchedOnAtTheStartWhileTheButtonIsPressed) {
   options.outputs[0].initial = true;
-  options.threaded = false;
   pulse::VirtualClock clock;
   sim::Rig rig(Bench::rigAxes(axes), nullptr, {}, {}, Bench::ioOf(options));
   rig.setInput("button", true, 0);
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
-  machine::Machine machine(axes, backend, clock, options);
+  test::UnthreadedMachine machine(axes, backend, clock, options);
   machine.advance(0.1);
   EXPECT_FALSE(machine.ioStates().outputs[0].changed);
   EXPECT_EQ(rig.outputLevel(pen().line), false);
@@ -388,14 +387,13 @@ TEST_F(NamedLines, AShortGlitchIsNoChangeWithADebounce) {
 TEST(NamedInput, ThatBouncesChangesOnceAtItsFirstEdge) {
   const std::vector<config::AxisConfig> axes{linearAxis("x")};
   machine::MachineOptions options;
-  options.threaded = false;
   options.inputs = {input("probe")};
   options.inputs[0].debounce_ns = 5 * kMillisecond;
   setup::SimulationConfig config;
   config.speed = 0.0;
   config.inputs["probe"] = {false, 20, 0.7};
   setup::Simulation simulation(axes, {}, {}, config, {}, options.inputs);
-  machine::Machine machine(axes, simulation.backend(), simulation.clock(), options);
+  test::UnthreadedMachine machine(axes, simulation.backend(), simulation.clock(), options);
   int changes = 0;
   machine::InputState before = machine.ioStates().inputs[0];
   for (const bool pressed : {true, false, true}) {

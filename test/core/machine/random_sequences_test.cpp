@@ -112,7 +112,7 @@ class Batch {
   }
 
   void command() {
-    machine::Machine& machine = *bench_.machine;
+    test::UnthreadedMachine& machine = *bench_.machine;
     axis::Axis& axis = bench_.axis(random_.chance(0.5) ? "x" : "y");
     const double velocity = random_.chance(0.5) ? 0.0 : random_.within(0.002, kSpeed);
     try {

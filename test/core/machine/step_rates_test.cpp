@@ -209,15 +209,14 @@ class MachineOnSlowHardware : public testing::Test {
 
   enum class Measure { kNo, kWarn, kEnforce };
 
-  std::unique_ptr<machine::Machine> make(double rate, Measure measure) {
+  std::unique_ptr<test::UnthreadedMachine> make(double rate, Measure measure) {
     config::AxisConfig config = axisOf(rate);
     config.start_speed = config.max_speed;
     machine::MachineOptions options;
-    options.threaded = false;
     options.measure = measure != Measure::kNo;
     options.enforce = measure == Measure::kEnforce;
-    return std::make_unique<machine::Machine>(std::vector<config::AxisConfig>{config}, backend,
-                                              clock, options);
+    return std::make_unique<test::UnthreadedMachine>(std::vector<config::AxisConfig>{config},
+                                                     backend, clock, options);
   }
 
   LateClock clock;
@@ -258,7 +257,7 @@ class FormulaOnTheEngine : public MachineOnSlowHardware {
   /// speed. The first step of each motion may slip.
   std::uint64_t slips(std::vector<config::AxisConfig> configs) {
     for (config::AxisConfig& config : configs) config.start_speed = config.max_speed;
-    machine::Machine machine(configs, backend, clock, {false});
+    test::UnthreadedMachine machine(configs, backend, clock);
     std::vector<axis::Move> moves;
     for (const auto& axis : machine.axes()) {
       moves.push_back(axis->moveTo(0.01 * axis->config().max_speed / configs[0].max_speed));

@@ -66,7 +66,7 @@ class StopPromises : public testing::Test {
   }
 
   axis::Axis& axis(const std::string& name) { return bench->axis(name); }
-  machine::Machine& machine() { return *bench->machine; }
+  test::UnthreadedMachine& machine() { return *bench->machine; }
 
   /// Requests a line of x and y in another thread, which waits for its end if it is accepted.
   void askForLine(bool wait = true) {

@@ -25,7 +25,6 @@ class TmcRestart : public testing::Test {
  protected:
   TmcRestart() {
     config_.holds_position_unpowered = true;
-    options_.threaded = false;
     options_.state_file = folder_.path() + "/state";
   }
   ~TmcRestart() override { machine_.reset(); }
@@ -36,8 +35,8 @@ class TmcRestart : public testing::Test {
       backend_ = std::make_unique<gpio::SimulatedBackend>(*rig_, [this] { return clock_.now(); });
     }
     machine_.reset();
-    machine_ = std::make_unique<machine::Machine>(std::vector<config::AxisConfig>{config_},
-                                                  *backend_, clock_, options_);
+    machine_ = std::make_unique<test::UnthreadedMachine>(std::vector<config::AxisConfig>{config_},
+                                                         *backend_, clock_, options_);
   }
   axis::Axis& x() { return machine_->axis("x"); }
   void move(double position) {
@@ -52,7 +51,7 @@ class TmcRestart : public testing::Test {
   pulse::VirtualClock clock_{0.0};
   std::unique_ptr<sim::Rig> rig_;
   std::unique_ptr<gpio::SimulatedBackend> backend_;
-  std::unique_ptr<machine::Machine> machine_;
+  std::unique_ptr<test::UnthreadedMachine> machine_;
 };
 
 TEST_F(TmcRestart, BringsAPositionBackIfTheDriverHasKeptItsPower) {

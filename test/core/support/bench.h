@@ -8,10 +8,10 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
-#include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/setup/simulation.h"
 #include "stepdriver_core/sim/rig.h"
+#include "support/unthreaded_machine.h"
 
 namespace stepdriver::test {
 
@@ -108,8 +108,7 @@ class Bench {
         trace(std::make_shared<sim::MemoryTrace>()),
         rig(judged(rig_axes, axes), trace, couplings(axes), motorPowerOf(options), ioOf(options)),
         backend(rig, [this] { return clock.now(); }) {
-    options.threaded = threaded;
-    machine = std::make_unique<machine::Machine>(axes, backend, clock, options);
+    machine = std::make_unique<UnthreadedMachine>(axes, backend, clock, options, threaded);
   }
 
   /// In a test, no motor may have got steps beyond what the configuration allows.
@@ -206,7 +205,7 @@ class Bench {
   std::shared_ptr<sim::MemoryTrace> trace;
   sim::Rig rig;
   gpio::SimulatedBackend backend;
-  std::unique_ptr<machine::Machine> machine;
+  std::unique_ptr<UnthreadedMachine> machine;
 };
 
 /// The violations of the axis in a report, in words.

@@ -33,7 +33,7 @@ class TrajectoryBench : public testing::Test {
     bench = std::make_unique<Bench>(axes, specs);
   }
 
-  machine::Machine& machine() { return *bench->machine; }
+  test::UnthreadedMachine& machine() { return *bench->machine; }
   machine::CoordinatedMove follow(const motion::TrajectoryRequest& request) {
     return machine().followTrajectory(request);
   }

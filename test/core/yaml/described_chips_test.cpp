@@ -122,13 +122,7 @@ class DescribedChips : public testing::Test {
       : configs_(describedAxes()),
         rig_(test::Bench::rigAxes(configs_)),
         backend_(rig_, [this] { return clock_.now(); }),
-        machine_(configs_, backend_, clock_, optionsWithoutThreads()) {}
-
-  static machine::MachineOptions optionsWithoutThreads() {
-    machine::MachineOptions options;
-    options.threaded = false;
-    return options;
-  }
+        machine_(configs_, backend_, clock_) {}
 
   std::int64_t edges() const {
     std::int64_t edges = 0;
@@ -169,7 +163,7 @@ class DescribedChips : public testing::Test {
   pulse::VirtualClock clock_{0.0};
   mutable sim::Rig rig_;
   gpio::SimulatedBackend backend_;
-  machine::Machine machine_;
+  test::UnthreadedMachine machine_;
 };
 
 TEST_F(DescribedChips, SeeNoViolationInManyEdges) {

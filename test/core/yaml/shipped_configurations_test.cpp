@@ -20,8 +20,7 @@ TEST_P(ShippedConfiguration, LosesNoStep) {
   config.state_file.clear();
   setup::Hardware hardware(config);
   machine::MachineOptions options = config.options();
-  options.threaded = false;
-  machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), options);
+  test::UnthreadedMachine machine(config.axes, hardware.backend(), hardware.clock(), options);
   for (const config::AxisConfig& axis_config : config.axes) {
     axis::Axis& axis = machine.axis(axis_config.name);
     axis.enable(true);

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "stepdriver_core/axis/axis_state.h"
@@ -17,13 +18,16 @@ namespace stepdriver::axis {
 /// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
 class Axis {
  public:
-  Axis() = default;
-  virtual ~Axis() = default;
+  struct Impl;
+
+  /// Called by the machine.
+  explicit Axis(std::unique_ptr<Impl> impl);
+  ~Axis();
   Axis(const Axis&) = delete;
   Axis& operator=(const Axis&) = delete;
 
   /// As configured. limits() and state() have what setLimits() and setMicrosteps() change.
-  virtual const config::AxisConfig& config() const = 0;
+  const config::AxisConfig& config() const;
 
   /// Moves to a position and rests there. It can interrupt another motion without a jump in speed
   /// or acceleration; the caller of the interrupted move is told. If the axis can't stop before its
@@ -40,31 +44,30 @@ class Axis {
   ///   at fault, the machine is on hold or shuts down, the position is absolute and the axis must
   ///   be homed first, or `shortest` is true and the position is relative or the axis isn't
   ///   continuous.
-  virtual Move moveTo(double position, bool relative = false, double velocity = 0.0,
-                      bool shortest = false) = 0;
+  Move moveTo(double position, bool relative = false, double velocity = 0.0, bool shortest = false);
 
   /// What moveTo() would do now; nothing moves.
   ///
   /// @throw Refused as moveTo().
-  virtual MovePlan plan(double position, bool relative = false, double velocity = 0.0,
-                        bool shortest = false) = 0;
+  MovePlan plan(double position, bool relative = false, double velocity = 0.0,
+                bool shortest = false);
 
   /// Turns the motor by a number of revolutions, which need not be whole.
   ///
   /// @throw Refused as moveTo(), and if the steps of a revolution are not known.
-  virtual Move moveRounds(double rounds, double velocity = 0.0) = 0;
+  Move moveRounds(double rounds, double velocity = 0.0);
 
   /// How a move ended, however long ago; empty if it hasn't ended.
-  virtual std::optional<MoveResult> result(const Move& move) const = 0;
+  std::optional<MoveResult> result(const Move& move) const;
 
   /// Returns when the move has ended. @throw Refused for a move of plan().
-  virtual MoveResult wait(const Move& move) = 0;
+  MoveResult wait(const Move& move);
 
   /// The same, for at most this time of the computer's clock, or of a virtual clock if the machine
   /// has no threads; then it also notices, within a millisecond, what its inputs do meanwhile.
   ///
   /// @return empty if the move hasn't ended by then; it continues.
-  virtual std::optional<MoveResult> waitFor(const Move& move, std::chrono::nanoseconds longest) = 0;
+  std::optional<MoveResult> waitFor(const Move& move, std::chrono::nanoseconds longest);
 
   /// Moves at a velocity until another command comes, or up to the soft limit, and rests there. 0
   /// ends a jog. A motion under way is replaced. A call with the velocity that the jog has already
@@ -75,7 +78,7 @@ class Axis {
   ///   one belongs to: a stream does not continue after a stop, a hold, a disable or a recover.
   /// @throw Refused as moveTo(), and if the axis rests at the soft limit ahead, or has been stopped
   ///   since.
-  virtual void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since = {}) = 0;
+  void jog(double velocity, std::optional<std::uint64_t> unless_stopped_since = {});
 
   /// Changes the limits of motions, within what is configured. They apply to the next plan: a move,
   /// a jog or a setpoint under way is planned again at once. If it would pass its target or a soft
@@ -88,10 +91,10 @@ class Axis {
   /// @param wanted 0: as configured.
   /// @throw Refused if a number isn't 0 or between the lowest limit and the configured one. A jerk
   ///   has no upper bound if no jerk limit is configured.
-  virtual void setLimits(const AxisLimits& wanted) = 0;
+  void setLimits(const AxisLimits& wanted);
 
   /// The limits of the next plan.
-  virtual AxisLimits limits() const = 0;
+  AxisLimits limits() const;
 
   /// Changes the currents of its motors whose drivers have a config::TmcConfig, at rest or in
   /// motion, until the machine ends. The highest step of the chip's scale that doesn't exceed the
@@ -102,16 +105,16 @@ class Axis {
   ///   is lower.
   /// @throw Refused if a current is out of range, if no motor has such a driver, or while one isn't
   ///   set up. @throw GpioError if a chip doesn't take it: the axis is then at fault.
-  virtual void setCurrent(double run, double hold) = 0;
+  void setCurrent(double run, double hold);
 
   /// Decelerates to rest, and returns when the pulse thread has the deceleration. The axes that
   /// move together with this one stop with it, along their path. A held goal is given up. Does
   /// nothing if the axis is at rest.
-  virtual void stop() = 0;
+  void stop();
 
   /// Stops the axis if it still makes this move or holds it. A motion that has replaced the move
   /// continues.
-  virtual void stop(const Move& move) = 0;
+  void stop(const Move& move);
 
   /// Finds the axis's zero by its switch, as AxisConfig::homing says, and returns when the homing
   /// is over. Soft limits don't apply meanwhile. If it fails, the axis rests, enabled as before,
@@ -119,28 +122,28 @@ class Axis {
   ///
   /// @param cancelled is asked often, in the calling thread: true decelerates and ends the homing.
   /// @throw Refused as moveTo(), if homing isn't configured, and while the axis moves.
-  virtual HomingResult home(const std::function<bool()>& cancelled = {}) = 0;
+  HomingResult home(const std::function<bool()>& cancelled = {});
 
   /// @throw Refused if home() would be refused now.
-  virtual void checkHoming() const = 0;
+  void checkHoming() const;
 
   /// Energizes the motor, or takes its current away; a motion under way is stopped first. Nothing
   /// holds a motor without current: disabling invalidates the position, unless
   /// AxisConfig::holds_position_unpowered is set.
   ///
   /// @throw Refused if enable isn't wired, or if the call enables a faulty axis.
-  virtual void enable(bool on) = 0;
+  void enable(bool on);
 
   /// Puts the chip to sleep, or wakes it. A chip wakes at its Home position, so the axis's position
   /// stays valid only if the translator was there and AxisConfig::holds_position_unpowered is set.
   ///
   /// @throw Refused while the axis moves, and if SLEEP isn't wired.
-  virtual void sleep(bool asleep) = 0;
+  void sleep(bool asleep);
 
   /// Pulses RESET: the translator returns to its Home position.
   ///
   /// @throw Refused while the axis moves, and if RESET isn't wired.
-  virtual void reset() = 0;
+  void reset();
 
   /// Changes the microstep mode and keeps the position; the steps per unit follow. If the new mode
   /// has no microstep at this position, the change is refused. With
@@ -149,21 +152,24 @@ class Axis {
   ///
   /// @throw Refused while the axis moves, if the chip doesn't have the mode or its pins aren't
   ///   wired, and for a chip whose mode is set by switches.
-  virtual void setMicrosteps(int microsteps) = 0;
+  void setMicrosteps(int microsteps);
 
   /// Declares where the axis stands; the position is valid from then on. Nothing moves.
   ///
   /// @throw Refused while the axis moves, and if the number isn't finite or is beyond a soft limit.
-  virtual void setPosition(double position) = 0;
+  void setPosition(double position);
 
   /// What the axis is and does now: consistent, of one instant.
-  virtual AxisState state() const = 0;
+  AxisState state() const;
 
   /// [microsteps/s] The highest planned rate of the motion under way; 0 at rest.
-  virtual double peakRate() const = 0;
+  double peakRate() const;
 
   /// @throw GpioError if a line can't be read.
-  virtual EndstopState endstops() const = 0;
+  EndstopState endstops() const;
+
+ private:
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace stepdriver::axis

@@ -46,9 +46,6 @@ enum class EmergencyDisable {
 
 /// What a Machine is made with, in addition to its axes.
 struct MachineOptions {
-  /// Threads of the machine serve its pulses and calls. If false, waiting calls and advance() serve
-  /// the pulses: for tests on a virtual clock.
-  bool threaded = true;
   /// A pulse that comes later than this, or so much longer after the last one than planned, at a
   /// speed that the motor can't restart from is a fault.
   double max_lateness = 0.005;  ///< [s]
@@ -360,6 +357,16 @@ class Machine {
 
   /// As measured at the start; empty if that wasn't requested, or if the clock is virtual.
   const std::optional<pulse::Capability>& capability() const;
+
+ protected:
+  /// Who serves the pulses and calls of a machine. A machine without threads is for tests and
+  /// simulations on a virtual clock, which derive a class of their own from this one.
+  enum class ServedBy {
+    kThreads,  ///< threads of the machine
+    kCallers,  ///< calls that wait, and advance(); one call at a time
+  };
+  Machine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend, pulse::Clock& clock,
+          const MachineOptions& options, ServedBy served_by);
 
   /// Serves the pulses for a time of the clock.
   ///
