@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 
 namespace stepdriver {
 namespace {

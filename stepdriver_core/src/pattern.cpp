@@ -1,4 +1,4 @@
-#include "stepdriver_core/pattern.h"
+#include "pattern.h"
 
 #include <array>
 #include <new>

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <ios>
 
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 #include "support/temporary_folder.h"
 
 namespace stepdriver::fuzz {

@@ -8,7 +8,7 @@
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/config/config_value.h"
 #include "stepdriver_core/machine/coordinated_move.h"
-#include "stepdriver_core/machine/streams.h"
+#include "stepdriver_core/machine/machine.h"
 
 /// What Python asks for, as the core takes it. They need the GIL.
 namespace stepdriver::python {

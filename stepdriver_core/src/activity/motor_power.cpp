@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "context.h"
+#include "gpio/chip_table.h"
 #include "message_text.h"
-#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::activity {
 namespace {

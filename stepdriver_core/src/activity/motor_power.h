@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "call.h"
-#include "stepdriver_core/config/motor_power_config.h"
+#include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::activity {

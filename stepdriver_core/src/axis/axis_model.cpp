@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "config/restart_speed.h"
+#include "gpio/chip_table.h"
 #include "message_text.h"
 #include "profile/resting_count.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
 #include "trajectory/backlash.h"
 
 namespace stepdriver::axis {

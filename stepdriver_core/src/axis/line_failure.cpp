@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 
 namespace stepdriver::axis {
 namespace {

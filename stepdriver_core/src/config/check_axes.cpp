@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "message_text.h"
+#include "printable.h"
 #include "read_axes.h"
 #include "read_kinematics.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 #include "write_axes.h"
 
 namespace stepdriver::config {

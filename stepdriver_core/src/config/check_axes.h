@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "config/used_lines.h"
-#include "stepdriver_core/config/check_axes.h"
+#include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::config {
 

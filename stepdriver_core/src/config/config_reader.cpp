@@ -1,4 +1,4 @@
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "message_text.h"
-#include "stepdriver_core/pattern.h"
-#include "stepdriver_core/printable.h"
+#include "pattern.h"
+#include "printable.h"
 
 namespace stepdriver::config {
 namespace {

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "message_text.h"
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 
 namespace stepdriver::config {
 namespace {

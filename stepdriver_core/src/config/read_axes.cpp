@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "message_text.h"
+#include "printable.h"
 #include "read_chip.h"
 #include "read_homing.h"
 #include "read_motion.h"
@@ -17,8 +19,6 @@
 #include "read_pins.h"
 #include "read_power.h"
 #include "read_shaper.h"
-#include "stepdriver_core/config/config_reader.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::config {
 namespace {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "config/read_chip.h"
 #include "config/used_lines.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 

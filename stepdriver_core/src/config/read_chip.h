@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 
 namespace stepdriver::config {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 
 namespace stepdriver::config {
 

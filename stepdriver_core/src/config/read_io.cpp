@@ -8,7 +8,7 @@
 
 #include "config/read_axes.h"
 #include "config/write_axes.h"
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 
 namespace stepdriver::config {
 namespace {

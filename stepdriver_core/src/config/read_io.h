@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "config/used_lines.h"
-#include "stepdriver_core/config/config_reader.h"
 #include "stepdriver_core/config/io_config.h"
 
 namespace stepdriver::config {

@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "config/config_reader.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 

@@ -13,7 +13,6 @@
 #include "motion_keys.h"
 #include "read_scale.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/config/farthest_limit.h"
 
 namespace stepdriver::config {
 namespace {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "config/used_lines.h"
 #include "read_chip.h"
 #include "read_tmc.h"
-#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 

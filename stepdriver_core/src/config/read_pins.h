@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "config/used_lines.h"
-#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 

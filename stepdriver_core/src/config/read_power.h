@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 
 namespace stepdriver::config {
 

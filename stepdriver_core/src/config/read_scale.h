@@ -2,8 +2,8 @@
 
 #include <optional>
 
+#include "config/config_reader.h"
 #include "motion_keys.h"
-#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 

@@ -7,7 +7,7 @@
 
 #include "driver/tmc_registers.h"
 #include "message_text.h"
-#include "stepdriver_core/driver/uart_chip.h"
+#include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::config {
 namespace {

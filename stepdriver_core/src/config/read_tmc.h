@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "config/config_reader.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/config/config_reader.h"
 
 namespace stepdriver::config {
 

@@ -7,8 +7,8 @@
 
 #include "message_text.h"
 #include "named_chips.h"
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::driver {
 

@@ -1,5 +1,4 @@
-#include "stepdriver_core/driver/uart_chip.h"
-
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
 #include "tmc_registers.h"
 

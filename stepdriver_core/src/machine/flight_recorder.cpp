@@ -7,10 +7,10 @@
 #include <cstring>
 #include <utility>
 
+#include "gpio/chip_table.h"
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::machine {
 namespace {

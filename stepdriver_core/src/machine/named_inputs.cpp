@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 
 namespace stepdriver::machine {
 namespace {

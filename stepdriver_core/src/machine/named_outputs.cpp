@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "gpio/chip_table.h"
 #include "message_text.h"
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::machine {
 

@@ -10,8 +10,8 @@
 #include "config/read_axes.h"
 #include "config/read_io.h"
 #include "config/write_axes.h"
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::machine {
 namespace {

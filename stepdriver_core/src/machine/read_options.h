@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "config/used_lines.h"
-#include "stepdriver_core/config/config_reader.h"
 #include "stepdriver_core/machine/machine.h"
 
 /// Readers of the keys of a configuration that become MachineOptions.

@@ -5,7 +5,7 @@
 #include "motor/input_shaping.h"
 #include "nanoseconds.h"
 #include "pulse/measure.h"
-#include "stepdriver_core/config/check_axes.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/machine/step_rates.h"
 
 namespace stepdriver::machine {

@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "channel/channel_config.h"
+#include "gpio/chip_table.h"
 #include "pulse/cpu_latency.h"
 #include "pulse/measure.h"
 #include "pulse/realtime.h"
 #include "start_thread.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::pulse {
 namespace {

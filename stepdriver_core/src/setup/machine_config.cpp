@@ -10,6 +10,8 @@
 #include "config/read_kinematics.h"
 #include "machine/read_options.h"
 #include "pulse/cpu_latency.h"
+#include "setup/read_machine_config.h"
+#include "setup/read_simulation.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
 #include "stepdriver_core/setup/simulation.h"
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "message_text.h"
+#include "setup/read_simulation.h"
 #include "sim/vcd_trace.h"
 #include "stepdriver_core/error.h"
 

@@ -1,8 +1,8 @@
-#include "stepdriver_core/setup/simulation_config.h"
-
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "setup/read_simulation.h"
 
 namespace stepdriver::setup {
 namespace {

@@ -9,8 +9,8 @@
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "path_reader.h"
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::motion {
 namespace {

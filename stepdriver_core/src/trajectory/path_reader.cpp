@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "message_text.h"
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::motion {
 

@@ -13,9 +13,9 @@
 #include <system_error>
 #include <utility>
 
+#include "printable.h"
 #include "scalar.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 #include "stepdriver_core/yaml.h"
 
 namespace stepdriver::yaml {

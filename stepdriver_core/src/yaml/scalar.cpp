@@ -10,8 +10,8 @@
 #include <optional>
 #include <string>
 
+#include "pattern.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/pattern.h"
 
 namespace stepdriver::yaml {
 namespace {

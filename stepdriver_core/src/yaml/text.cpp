@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <string>
 
+#include "printable.h"
 #include "scalar.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 #include "stepdriver_core/yaml.h"
 
 namespace stepdriver::yaml {

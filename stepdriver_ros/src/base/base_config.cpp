@@ -7,7 +7,7 @@
 #include <cstddef>
 
 #include "common/text.h"
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 
 namespace stepdriver::base {
 namespace {

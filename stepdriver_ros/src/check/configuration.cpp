@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/text.h"
+#include "setup/read_machine_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/yaml.h"
 #include "table.h"

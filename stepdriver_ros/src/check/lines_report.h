@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "gpio/chip_table.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/gpio/chip_table.h"
 #include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::check {

@@ -4,7 +4,7 @@
 
 #include <cerrno>
 
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 #include "table.h"
 
 namespace stepdriver::check {

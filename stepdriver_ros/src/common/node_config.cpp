@@ -1,6 +1,7 @@
 #include "node_config.h"
 
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
+#include "setup/read_machine_config.h"
 
 namespace stepdriver::ros_node {
 namespace {

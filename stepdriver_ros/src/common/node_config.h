@@ -5,7 +5,7 @@
 
 #include "stepdriver_core/config/config_value.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/streams.h"
+#include "stepdriver_core/machine/machine.h"
 #include "stepdriver_core/setup/machine_config.h"
 
 namespace stepdriver::ros_node {

@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 #include "xmlrpc_value.h"
 
 namespace stepdriver::ros_node {

@@ -9,7 +9,6 @@
 
 #include "common/text.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/config/farthest_limit.h"
 #include "xml_mistake.h"
 
 namespace stepdriver::ros_node {

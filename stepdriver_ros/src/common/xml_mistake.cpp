@@ -8,7 +8,7 @@
 #include <limits>
 #include <memory>
 
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 
 namespace stepdriver::ros_node {
 namespace {

@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "pattern.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/pattern.h"
 
 namespace stepdriver::console {
 

@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "common/text.h"
+#include "pattern.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/pattern.h"
 
 namespace stepdriver::console {
 

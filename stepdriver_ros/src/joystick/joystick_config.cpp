@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 
 namespace stepdriver::joystick {
 namespace {

@@ -1,5 +1,3 @@
-#include "stepdriver_core/config/check_axes.h"
-
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -8,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/setup/hardware.h"
 #include "support/bench.h"

@@ -1,4 +1,4 @@
-#include "stepdriver_core/printable.h"
+#include "printable.h"
 
 #include <gtest/gtest.h>
 

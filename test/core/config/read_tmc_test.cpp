@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/config/check_axes.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "support/axis_config.h"
 
 namespace stepdriver::config {

@@ -1,4 +1,4 @@
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 
 #include <gtest/gtest.h>
 

@@ -12,7 +12,7 @@
 #include "config/bounds.h"
 #include "config/restart_speed.h"
 #include "search/participants.h"
-#include "stepdriver_core/config/check_axes.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 #include "support/corexy_bench.h"
 

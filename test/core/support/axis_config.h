@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
 #include "support/config_map.h"
 
 namespace stepdriver::config {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "bench.h"
-#include "stepdriver_core/driver/uart_chip.h"
+#include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::test {
 

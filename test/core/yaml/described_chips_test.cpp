@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "config/config_reader.h"
 #include "stepdriver_core/yaml.h"
 #include "support/bench.h"
 #include "support/config_map.h"

@@ -136,4 +136,14 @@ constexpr int kFullStepsPerCycle = 4;
 /// the position: the index must exist in both modes.
 bool keepsPosition(std::int64_t index, int from_microsteps, int to_microsteps);
 
+/// Whether this version can configure the chip over its UART.
+bool hasUart(const DriverChip& chip);
+
+/// The chip as it is when its registers, and not its pins, select the microsteps: it has each power
+/// of two up to 256, and its address is at MS1 and MS2. A config::MotorConfig with a
+/// config::TmcConfig has this chip.
+///
+/// @throw Error if hasUart() says no.
+DriverChip uartChip(DriverChip chip);
+
 }  // namespace stepdriver::driver

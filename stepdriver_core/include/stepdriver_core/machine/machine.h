@@ -12,12 +12,10 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/io_config.h"
-#include "stepdriver_core/config/motor_power_config.h"
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/machine/io_states.h"
 #include "stepdriver_core/machine/recording.h"
-#include "stepdriver_core/machine/streams.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -98,6 +96,18 @@ struct EngineFigures {
   pulse::LatenessFigures lateness;
   pulse::LatenessFigures lateness_last_second;
   std::string realtime;  ///< how the pulse thread runs, in words
+};
+
+/// What the numbers of a stream of setpoints are.
+enum class SetpointMode { kPosition, kVelocity };
+
+/// A message of a stream for one axis, see Machine::jog() and Machine::followSetpoints().
+struct StreamMessage {
+  std::string name;    ///< the axis's name
+  double value = 0.0;  ///< [unit] a position, or [unit/s] a velocity: m or rad
+  /// AxisState::stops as it was when the stream began: a stream does not continue after a stop, a
+  /// hold, a disable or a recover. Empty: it is not checked.
+  std::optional<std::uint64_t> unless_stopped_since;
 };
 
 /// All axes of a machine, with one pulse engine and one set of lines. All calls are safe from any

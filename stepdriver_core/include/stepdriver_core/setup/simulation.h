@@ -12,7 +12,6 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/io_config.h"
-#include "stepdriver_core/config/motor_power_config.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/setup/simulation_config.h"

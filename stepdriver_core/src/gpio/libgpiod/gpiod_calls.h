@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 #include "stepdriver_core/gpio/lines.h"
 
 /// The functions of libgpiod that the backend needs, independent of its version. gpiod1.cpp and

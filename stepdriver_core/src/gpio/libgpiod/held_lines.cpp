@@ -11,9 +11,9 @@
 #include <mutex>
 #include <utility>
 
+#include "gpio/chip_table.h"
 #include "steady_now.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::gpio::gpiod {
 namespace {

@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
+#include "gpio/chip_table.h"
 #include "gpiod_calls.h"
-#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::gpio::gpiod {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "request_context.h"
-#include "stepdriver_core/machine/streams.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::machine {
 

@@ -5,9 +5,9 @@
 #include <memory>
 
 #include "activity/driver_activities.h"
+#include "gpio/chip_table.h"
 #include "message_text.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/gpio/chip_table.h"
 
 namespace stepdriver::machine {
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::machine {
 

@@ -12,8 +12,10 @@
 #include "common/node_start.h"
 #include "common/robot_description.h"
 #include "common/xmlrpc_value.h"
-#include "stepdriver_core/config/check_axes.h"
-#include "stepdriver_core/config/config_reader.h"
+#include "config/config_reader.h"
+#include "setup/read_machine_config.h"
+#include "setup/read_simulation.h"
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::ros_node {

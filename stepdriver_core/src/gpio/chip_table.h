@@ -4,25 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/gpio/libgpiod_lines.h"
 #include "stepdriver_core/gpio/lines.h"
 
 /// The GPIO chips of a machine as plain data, and how the names of lines are found in it.
 namespace stepdriver::gpio {
-
-/// A line of a chip.
-struct LineInfo {
-  std::string name;      ///< the kernel's name of the line; most have none
-  bool used = false;     ///< held by a program or by the kernel
-  std::string consumer;  ///< the name under which its holder requested it; may be empty
-};
-
-/// A chip, whether it could be opened or not.
-struct ChipInfo {
-  std::string name;             ///< `gpiochip0`; may change from one boot to the next
-  std::string label;            ///< such as `pinctrl-bcm2711`; doesn't change
-  int error = 0;                ///< errno if it couldn't be opened or read; it then has no lines
-  std::vector<LineInfo> lines;  ///< by offset
-};
 
 /// The address of a line.
 struct LineAddress {
