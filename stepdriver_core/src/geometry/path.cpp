@@ -468,7 +468,7 @@ void Path::evaluate(std::size_t index, double u, PathPoint& point) const {
 // Adds shift (m(w) - |w|) + jump/4 (n(w) - w|w|) at a distance |w| from the corner, on the side
 // that the sign of w tells.
 void Path::blend(const End& end, double distance, double sign, PathPoint& point) const {
-  if (!(distance < end.blend)) return;
+  if (!(end.blend > 0.0 && distance < end.blend)) return;
   const double y = distance / end.blend;
   const double position = end.blend * (kMidRounding + y * y * (0.75 - 0.125 * y * y)) - distance;
   const double first = sign * end.rate * (y * (1.5 - 0.5 * y * y) - 1.0);

@@ -214,7 +214,7 @@ double PathGrid::evaluateAt(std::size_t interval, double distance, PathPoint& po
       point.position[j] = position(interval)[j] + distance * point.first[j];
       point.second[j] = 0.0;
     }
-    return of.from + (of.to - of.from) * distance / of.length;
+    return std::clamp(of.from + (of.to - of.from) * distance / of.length, of.from, of.to);
   }
   auto& [begin, middle, end] = scratch_;
   evaluate(of.segment, of.from, begin);

@@ -139,11 +139,9 @@ QueuedPath::Start QueuedPath::onStraight(std::size_t knot, std::int64_t time_ns)
                       static_cast<double>(after.time_ns - before.time_ns);
   const double speed = before.speed + part * (after.speed - before.speed);
   const double way = part * (before.speed + speed) / (before.speed + after.speed);
-  return {time_ns,
-          after.segment,
-          {from + way * (after.parameter - from), speed, before.acceleration, before.average},
-          {},
-          true};
+  const double parameter = from + std::min(way, 1.0) * (after.parameter - from);
+  return {
+      time_ns, after.segment, {parameter, speed, before.acceleration, before.average}, {}, true};
 }
 
 QueuedPath::Start QueuedPath::atKnot(const PathWindow::Knot& knot) {

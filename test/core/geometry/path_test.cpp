@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "profile/errors.h"
@@ -357,6 +358,16 @@ TEST(Path, HasTheSamePlaceAtBothSidesOfACorner) {
         EXPECT_EQ(begin.position, end.position) << "segment " << k;
       }
     }
+  }
+}
+
+TEST(Path, HasNoRoundingBeyondAnEndThatIsNotRounded) {
+  const Path path({0.0, 0.0}, {lineTo({10.0, 0.0}, 1.0), lineTo({20.0, 0.0}, 1.0)}, 1.0);
+  PathPoint point;
+  for (const auto& [segment, parameter] : {std::pair{0, 1.0 + 1e-9}, std::pair{1, -1e-9}}) {
+    path.evaluate(static_cast<std::size_t>(segment), parameter, point);
+    EXPECT_NEAR(point.position[0], 10.0, 2e-8);
+    EXPECT_EQ(point.first, (std::vector<double>{10.0, 0.0}));
   }
 }
 

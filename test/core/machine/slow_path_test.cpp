@@ -118,6 +118,29 @@ TEST(SlowPath, ThatIsContinuedNextToItsEndDoesNotPassIt) {
   EXPECT_EQ(count, 530);
 }
 
+// A knot right before the end of a line may be beyond it by rounding: there is no corner to round.
+TEST(SlowPath, ThatIsContinuedAtTheVeryEndOfALineFollowsIt) {
+  const std::vector<motion::PathAxis> axes = {pathAxis("x", {1.0, 1e6, 0.001, 11963015701203.42}),
+                                              pathAxis("y", {1.0, 1e6, 1e12, 1e15})};
+  const auto line_to = [](double x, double y, double velocity) {
+    PathSegment segment;
+    segment.end = {x, y};
+    segment.velocity = velocity;
+    return segment;
+  };
+  PathRequest request{{"x", "y"}, {}, false, 44.163953657607436, 0.00016340833237044595, true};
+  request.segments = {line_to(0.10154743253002302, 0.0, 0.0), line_to(744.07185447244331, 0.0, 0.0),
+                      line_to(744.81577395268141, 0.0, 313.21105492709307),
+                      line_to(744.42605677204301, 1.4957532667175146, 0.0)};
+  const PlannedPath first = planned(request, axes);
+  const PlannedPath path = test::fed(first,
+                                     {line_to(744.42663820597841, 1.4961840872570629, 0.0),
+                                      line_to(1064.4813164357722, 1.4961840872570629, 0.0)},
+                                     136.38848243120549);
+  EXPECT_EQ(path.endCount(0), 1064);
+  EXPECT_EQ(path.endCount(1), 1);
+}
+
 // While x moves fast, y rests: its low acceleration makes no difference to how the knots of x may
 // lie.
 TEST(SlowPath, BeforeAFastLineDoesNotMakeThatOneFaster) {
