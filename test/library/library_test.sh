@@ -7,8 +7,8 @@ usage() {
 usage: test/library/library_test.sh BUILD COMPILER
 
 Installs the core from the build folder BUILD into an empty folder. Each installed header must compile by
-itself, and a program must link the core by find_package() and by pkg-config. So must a copy of
-examples/move_axis, which must also move its axis. Exit status 0: all passed.
+itself, and so must its examples, of which each has one. A program must link the core by find_package() and by
+pkg-config. So must a copy of examples/move_axis, which must also move its axis. Exit status 0: all passed.
 END_OF_USAGE
 }
 case ${1:-} in
@@ -42,6 +42,14 @@ while IFS= read -r header; do
 done < <(cd "$prefix/include" && find . -name '*.h' | sed 's|^\./||' | sort)
 ((headers > 0)) || die "no header is installed"
 printf '%d headers compile, each by itself.\n' "$headers"
+
+if [[ -f $prefix/include/stepdriver_core/yaml.h ]]; then  # the examples read files
+  examples=$(python3 "$root/test/library/header_examples.py" "$prefix/include" "$scratch/examples.cpp") ||
+    die "$examples"
+  "$compiler" -std=c++17 -Wall -Wextra -Werror -Wno-unused-variable -fsyntax-only -I "$prefix/include" \
+    "$scratch/examples.cpp" || die "an example of a header doesn't compile"
+  printf '%d examples of the headers compile.\n' "$examples"
+fi
 
 # says WANTED FOLDER PROGRAM [ARGUMENT...]: runs a program in FOLDER and looks for WANTED in its output.
 says() {

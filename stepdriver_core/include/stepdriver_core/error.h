@@ -7,6 +7,14 @@
 namespace stepdriver {
 
 /// The base of all stepdriver errors. what() is a whole sentence for the person who reads it.
+///
+/// @code{.cpp}
+/// try {
+///   machine.axis("x").moveTo(0.05);  // [m]
+/// } catch (const Error& error) {
+///   std::cerr << error.what() << "\n";  // "x: the axis is disabled"
+/// }
+/// @endcode
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

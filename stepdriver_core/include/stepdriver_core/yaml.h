@@ -14,6 +14,11 @@ namespace stepdriver::yaml {
 ///
 /// @throw Error if the file can't be read or isn't YAML; it begins with `file:line:column:`.
 /// @throw ConfigError listing every mistake.
+///
+/// @code{.cpp}
+/// const setup::MachineConfig config =
+///     yaml::readFile("a4988.yaml", setup::BackendChoice::kSimulated);
+/// @endcode
 setup::MachineConfig readFile(const std::string& path,
                               setup::BackendChoice choice = setup::BackendChoice::kAsInTheFile);
 

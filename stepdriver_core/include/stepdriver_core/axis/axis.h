@@ -16,6 +16,13 @@ namespace stepdriver::axis {
 /// All calls are safe from any thread. The machine carries out the calls of all its axes one after
 /// another, in the order in which they arrive. Every command is either accepted as a whole, or
 /// throws Refused and changes nothing. A unit is m on a linear axis, rad on a rotary one.
+///
+/// @code{.cpp}
+/// axis::Axis& x = machine.axis("x");
+/// x.enable(true);
+/// const axis::MoveResult result = x.wait(x.moveTo(0.05));  // [m]
+/// std::cout << result.message << "\n";                      // "x reached 0.05 m"
+/// @endcode
 class Axis {
  public:
   struct Impl;

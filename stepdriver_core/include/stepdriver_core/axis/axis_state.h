@@ -71,6 +71,12 @@ struct HomingResult {
 };
 
 /// What an axis is and does at one instant. A unit is m on a linear axis, rad on a rotary one.
+///
+/// @code{.cpp}
+/// const axis::AxisState state = machine.axis("x").state();
+/// if (!state.position_valid) std::cout << "x must be homed\n";
+/// if (!state.fault.empty()) std::cout << state.fault << ": " << state.remedy << "\n";
+/// @endcode
 struct AxisState {
   /// By its own commands, and with power; a shared ENABLE line may energize it all the same.
   bool enabled = false;

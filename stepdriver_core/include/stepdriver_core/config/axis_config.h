@@ -158,6 +158,19 @@ struct ShaperConfig {
 /// An axis with several motors, such as a gantry, has those of the first one here and all others in
 /// `twins`. They step together: what kind of edges makes a step is the same for all their drivers,
 /// each has the configured microsteps, and ENABLE and SLEEP are wired for all or for none.
+///
+/// @code{.cpp}
+/// config::AxisConfig x;
+/// x.name = x.joint = "x";
+/// x.driver = driver::driverChip("a4988");
+/// x.pins.step.line = "gpiochip0:17";
+/// x.pins.dir.line = "gpiochip0:27";
+/// x.microsteps = 16;
+/// x.steps_per_unit = 80'000.0;  // 80 steps/mm
+/// x.max_speed = 0.1;            // [m/s]
+/// x.acceleration = x.deceleration = 1.0;  // [m/s^2]
+/// config::checkAxes({x});
+/// @endcode
 struct AxisConfig : MotorConfig {
   std::string name;
   std::string joint;  ///< its name in joint_states and in the URDF
@@ -263,9 +276,6 @@ constexpr double kFarthestLimit = 9007199254740992.0;
 /// Checks axes that a program has made itself, by the rules of a configuration file: readAxes() has
 /// checked those of a file already. A machine::Machine and a setup::Hardware call it. Messages name
 /// the keys and the units of a file.
-///
-///     std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
-///     config::checkAxes(axes);
 ///
 /// @throw ConfigError with all issues, for example "axes/x/deceleration_mm_s2: is 0.0, but must be
 ///   above 0".

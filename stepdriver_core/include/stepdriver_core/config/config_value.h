@@ -9,6 +9,13 @@
 namespace stepdriver::config {
 
 /// An unchecked configuration, as the parameter server or a YAML file contains it.
+///
+/// @code{.cpp}
+/// using config::ConfigValue;
+/// const ConfigValue gpio = ConfigValue::Map{{"backend", "simulated"}};
+/// std::cout << gpio.shown() << "\n";                                      // "a map of 1"
+/// std::cout << *gpio.as<ConfigValue::Map>()->at("backend").as<std::string>() << "\n";
+/// @endcode
 class ConfigValue {
  public:
   /// Both may contain values of any type, including each other.

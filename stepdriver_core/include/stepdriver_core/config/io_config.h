@@ -10,6 +10,16 @@
 namespace stepdriver::config {
 
 /// An output: a relay, a pump, a laser, the magnet that lifts a pen.
+///
+/// @code{.cpp}
+/// config::OutputConfig pump;
+/// pump.name = "pump";
+/// pump.line = "gpiochip0:5";
+/// pump.at_stop = false;              // Machine::stop() switches it off
+/// pump.max_on_ns = 60'000'000'000;  // and so does a minute
+/// machine::MachineOptions options;
+/// options.outputs = {pump};
+/// @endcode
 struct OutputConfig {
   std::string name;
   std::string line;

@@ -12,6 +12,16 @@ enum class ChopperMode {
 
 /// A driver chip that is configured and diagnosed over its UART. A program that makes its own
 /// config::MotorConfig gives it a driver::uartChip().
+///
+/// @code{.cpp}
+/// config::TmcConfig tmc;
+/// tmc.port = "/dev/serial0";
+/// tmc.sense_resistor = 0.11;  // [Ohm]
+/// tmc.run_current = 0.8;      // [A rms]
+/// config::AxisConfig x;
+/// x.driver = driver::uartChip(driver::driverChip("tmc2209"));
+/// x.tmc = tmc;
+/// @endcode
 struct TmcConfig {
   std::string port;             ///< serial port, such as `/dev/serial0`
   int baud = 115200;            ///< the same for all chips of a port

@@ -59,6 +59,13 @@ enum class StepInputs {
 };
 
 /// A driver chip or a driver box according to its datasheet, wired without inversions.
+///
+/// @code{.cpp}
+/// driver::DriverChip mine = driver::driverChip("a4988");
+/// mine.title = "A4988 behind an optocoupler";
+/// mine.timing.step_high_ns = 5'000;
+/// mine.timing.step_low_ns = 5'000;
+/// @endcode
 struct DriverChip {
   std::string name;   ///< as in configurations: a4988
   std::string title;  ///< as in messages: A4988

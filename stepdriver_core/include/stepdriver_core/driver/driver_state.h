@@ -7,6 +7,12 @@
 namespace stepdriver::driver {
 
 /// What a driver chip has told of itself over its serial port.
+///
+/// @code{.cpp}
+/// const axis::AxisState x = machine.axis("x").state();
+/// if (x.drivers == nullptr) return;  // none has a serial port
+/// for (const driver::DriverState& chip : *x.drivers) std::cout << chip.run_current << " A\n";
+/// @endcode
 struct DriverState {
   std::string motor;       ///< of an axis with several; empty: it is the only one
   bool is_set_up = false;  ///< its registers are written and verified

@@ -43,6 +43,12 @@ std::unique_ptr<Backend> makeLibgpiodBackend();
 /// The current chips of the computer, by number, including those that may not be opened.
 ///
 /// @throw GpioError if stepdriver was built without libgpiod.
+///
+/// @code{.cpp}
+/// for (const gpio::ChipInfo& chip : gpio::gpioChips()) {
+///   std::cout << chip.name << " (" << chip.label << "): " << chip.lines.size() << " lines\n";
+/// }
+/// @endcode
 std::vector<ChipInfo> gpioChips();
 
 }  // namespace stepdriver::gpio

@@ -47,6 +47,14 @@ struct EdgeEvent {
 ///
 /// write() and read() may be called from several threads. They neither throw nor allocate, because
 /// the pulse thread calls them.
+///
+/// @code{.cpp}
+/// const auto lines = backend.request({{"gpiochip0:17", false, false}}, {{"gpiochip0:20"}});
+/// const gpio::LineWrite high{0, true};  // the first output
+/// const int error = lines->write(&high, 1);
+/// if (error != 0) std::cerr << std::strerror(error) << "\n";
+/// const bool pressed = lines->read(0) == 1;  // the first input
+/// @endcode
 class Lines {
  public:
   Lines() = default;

@@ -64,6 +64,12 @@ class Board {
 /// Lines of one write change at the same time, and the board sees them in the order of the write.
 /// A write or a read of an index that the request doesn't have fails with EINVAL. A bias changes
 /// nothing: the board decides what an input reads.
+///
+/// @code{.cpp}
+/// pulse::VirtualClock clock;
+/// sim::Rig rig({});  // or another gpio::Board
+/// gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
+/// @endcode
 class SimulatedBackend : public Backend {
  public:
   /// Nanoseconds on the clock that stamps the edges.

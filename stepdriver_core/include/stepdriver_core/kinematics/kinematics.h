@@ -14,6 +14,13 @@ using Matrix = std::vector<std::vector<double>>;
 /// one whose driver chip and pins stand in the n-th axis. Endstops, scales and limits in an axis
 /// are those of the axis. Such an axis can't have motors of its own, a backlash, an idle timeout or
 /// a brake.
+///
+/// @code{.cpp}
+/// config::Kinematics corexy;
+/// corexy.axes = {"x", "y"};
+/// corexy.matrix = {{1.0, 1.0}, {1.0, -1.0}};
+/// corexy.inverse = *config::inverseOf(corexy.matrix);
+/// @endcode
 struct Kinematics {
   std::vector<std::string> axes;  ///< their names
   /// For each motor: [unit] how far it moves for a unit of each axis. A unit of a motor is as many

@@ -10,6 +10,12 @@
 namespace stepdriver::machine {
 
 /// An accepted motion of several axes.
+///
+/// @code{.cpp}
+/// const machine::CoordinatedMove line = machine.moveLine({{"x", "y"}, {0.05, 0.02}});  // [m]
+/// std::cout << "it takes " << line.duration << " s\n";
+/// std::cout << machine.wait(line).message << "\n";  // "all axes reached their targets"
+/// @endcode
 struct CoordinatedMove {
   /// The part of one axis in it.
   struct Member {

@@ -30,6 +30,12 @@ struct InputState {
 };
 
 /// The lines with a name, in the order of the configuration.
+///
+/// @code{.cpp}
+/// for (const machine::InputState& input : machine.ioStates().inputs) {
+///   std::cout << input.name << (input.active ? " is active\n" : " is not active\n");
+/// }
+/// @endcode
 struct IoStates {
   std::vector<OutputState> outputs;
   std::vector<InputState> inputs;

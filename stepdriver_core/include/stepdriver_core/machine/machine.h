@@ -112,6 +112,15 @@ struct StreamMessage {
 
 /// All axes of a machine, with one pulse engine and one set of lines. All calls are safe from any
 /// thread.
+///
+/// @code{.cpp}
+/// const setup::MachineConfig config = yaml::readFile("a4988.yaml");
+/// setup::Hardware hardware(config);
+/// machine::Machine machine(config.axes, hardware.backend(), hardware.clock(), config.options());
+/// axis::Axis& x = machine.axis("x");
+/// x.wait(x.moveTo(0.05));  // [m]
+/// machine.shutdown();
+/// @endcode
 class Machine {
  public:
   /// Requests the lines, all with their safe levels, brings each driver chip to a known state, and

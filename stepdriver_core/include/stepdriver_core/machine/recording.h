@@ -13,6 +13,14 @@ constexpr const char* kNothingRecorded = "nothing is recorded: recorder/seconds 
 
 /// The last seconds of a machine: each edge of its outputs, and what it was asked and did. Times
 /// are those of its clock; edges and events are in the order of time.
+///
+/// @code{.cpp}
+/// const machine::Recording recording = machine.recording();
+/// for (const machine::Recording::Event& event : recording.events) {
+///   const double ago = static_cast<double>(recording.end - event.time) * 1e-9;
+///   std::cout << ago << " s ago: " << event.text << "\n";
+/// }
+/// @endcode
 struct Recording {
   /// An output of an axis. Axes can share one.
   struct Pin {

@@ -26,6 +26,13 @@ struct StepRate {
 };
 
 /// The step rates of all axes.
+///
+/// @code{.cpp}
+/// const pulse::Capability measured = machine::measure(config.axes, backend, clock);
+/// for (const machine::StepRate& rate : machine::stepRates(config.axes, measured).axes) {
+///   std::cout << rate.text() << "\n";
+/// }
+/// @endcode
 struct StepRates {
   std::vector<StepRate> axes;
 

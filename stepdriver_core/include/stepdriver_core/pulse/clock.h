@@ -96,6 +96,12 @@ class SteadyClock : public Clock {
 /// thread that serves them is. Only if a paced clock stands still for more than kStall of real
 /// time between two waits, for example in a process that was suspended, does the next wait end as
 /// late as it would on real lines.
+///
+/// @code{.cpp}
+/// pulse::VirtualClock at_once;          // for tests: an hour of motion takes seconds
+/// pulse::VirtualClock as_fast(1.0);     // as fast as the real one
+/// std::cout << at_once.now() << " ns\n";  // "0 ns"
+/// @endcode
 class VirtualClock : public Clock {
  public:
   /// @param speed virtual seconds per second of CLOCK_MONOTONIC; 0: a wait ends at once, and the

@@ -39,6 +39,12 @@ struct Dump {
 ///
 /// A recording is two files that belong together: the edges of all outputs as VCD, and the events
 /// as text. Both have the same zero. If they can't be written, neither is left.
+///
+/// @code{.cpp}
+/// recorder::Dumper dumper(machine, {"/var/log/stepdriver", "plotter"});
+/// const recorder::Dump dump = dumper.dump("the sheet has slipped");
+/// std::cout << (dump.error.empty() ? dump.trace : dump.error) << "\n";
+/// @endcode
 class Dumper {
  public:
   /// @param machine outlives the dumper. It records.

@@ -23,6 +23,12 @@ struct DriverFinding {
 ///   Then each line is driven to both levels, and the chips are asked which of their pins follows.
 /// @return for each driver one finding, and then one for each of its lines.
 /// @throw GpioError if a line can't be requested or written.
+///
+/// @code{.cpp}
+/// for (const setup::DriverFinding& found : setup::checkDrivers(config.axes, backend, true)) {
+///   std::cout << (found.is_right ? "   " : "!! ") << found.text << "\n";
+/// }
+/// @endcode
 std::vector<DriverFinding> checkDrivers(const std::vector<config::AxisConfig>& axes,
                                         gpio::Backend& backend, bool wiring);
 

@@ -13,6 +13,11 @@ namespace stepdriver::setup {
 /// The lines of a configured machine, and the clock that times its pulses: the GPIO lines of this
 /// computer on CLOCK_MONOTONIC, or the simulated rig on a clock of its own. No line is touched
 /// until a machine::Machine requests the lines.
+///
+/// @code{.cpp}
+/// setup::Hardware hardware(config);
+/// std::cout << hardware.description() << "\n";  // "the simulated rig"
+/// @endcode
 class Hardware {
  public:
   /// @param name of the map that the configuration was read from, for messages; it may be empty.

@@ -66,6 +66,11 @@ void chooseBackend(config::ConfigValue& tree, BackendChoice choice);
 /// Reads a whole configuration, with or without the keys that only the ROS node uses.
 ///
 /// @throw ConfigError listing every mistake.
+///
+/// @code{.cpp}
+/// const config::ConfigValue tree = yaml::load("a4988.yaml");
+/// const auto config = setup::machineConfigOf(tree, setup::BackendChoice::kSimulated);
+/// @endcode
 MachineConfig machineConfigOf(config::ConfigValue tree,
                               BackendChoice choice = BackendChoice::kAsInTheFile);
 

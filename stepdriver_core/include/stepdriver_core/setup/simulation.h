@@ -36,6 +36,14 @@ sim::MotorSpec motorOf(const std::vector<config::AxisConfig>& axes, std::size_t 
 
 /// The simulated rig of a configuration, its lines and its clock. All calls are safe from any
 /// thread.
+///
+/// @code{.cpp}
+/// setup::Hardware hardware(config);
+/// if (setup::Simulation* simulation = hardware.simulation()) {
+///   simulation->pressEndstop("x", setup::Simulation::End::kMin, true);
+///   std::cout << simulation->rig().report("x").carriage << " mm\n";
+/// }
+/// @endcode
 class Simulation {
  public:
   /// @param emergency_stop the machine's input, to which the rig connects a button.

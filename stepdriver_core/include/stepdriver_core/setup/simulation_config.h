@@ -75,6 +75,13 @@ struct SimulatedInput {
 };
 
 /// The configuration of the simulated rig.
+///
+/// @code{.cpp}
+/// setup::SimulationConfig simulation;
+/// simulation.speed = 0.0;  // as fast as possible
+/// simulation.trace = "/tmp/axis.vcd";
+/// simulation.axes["x"].start = 10.0;  // [mm]
+/// @endcode
 struct SimulationConfig {
   double speed = 1.0;  ///< seconds of the rig per second; 0: as fast as possible
   std::string trace;   ///< path of the VCD file; empty: no trace

@@ -38,6 +38,12 @@ class PinTrace {
 };
 
 /// Keeps every edge in memory, for tests. Read it while nothing moves.
+///
+/// @code{.cpp}
+/// const auto trace = std::make_shared<sim::MemoryTrace>();
+/// sim::Rig rig({}, trace);
+/// for (const std::int64_t time : trace->times("x", "step", true)) std::cout << time << " ns\n";
+/// @endcode
 class MemoryTrace : public PinTrace {
  public:
   /// A pin that changed to a level.

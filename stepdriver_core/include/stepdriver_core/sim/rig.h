@@ -284,6 +284,13 @@ struct RigFaults {
 ///
 /// All calls are safe from any thread. A time before the latest one so far counts as the latest
 /// one.
+///
+/// @code{.cpp}
+/// sim::RigAxisSpec x;
+/// x.name = "x";
+/// sim::Rig rig({x});
+/// std::cout << rig.report("x").pulses_forward << " pulses\n";
+/// @endcode
 class Rig : public gpio::Board {
  public:
   /// @param trace receives every edge in the order of time, including those of bouncing switches;

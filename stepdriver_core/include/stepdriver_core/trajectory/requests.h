@@ -117,6 +117,16 @@ constexpr double kLargestArcMismatch = 5e-4;  ///< [unit]
 
 /// Segments that several axes follow without stopping, as Machine::followPath() takes them. A unit
 /// is m on a linear axis, rad on a rotary one.
+///
+/// @code{.cpp}
+/// motion::PathSegment right;
+/// right.end = {0.05, 0.0};  // [m]
+/// motion::PathSegment up;
+/// up.end = {0.05, 0.05};
+/// motion::PathRequest corner{{"x", "y"}, {right, up}};
+/// corner.tolerance = 1e-4;  // [m] it is rounded by a tenth of a millimetre
+/// const machine::CoordinatedMove move = machine.followPath(corner);
+/// @endcode
 struct PathRequest {
   std::vector<std::string> names;  ///< the axes' names, each once; need not be all
   /// 1 to kMostPathSegments. A line or a Bezier all of whose points are within a thousandth of a
