@@ -51,6 +51,7 @@ void NamedOutput::await(const SharedCall& call) {
 
 std::string NamedOutput::poll(activity::Context& context, const std::string& why_safe) {
   const bool must_be_safe = !why_safe.empty();
+  const bool was_safe = wanted_ == config_.at_fault;
   std::string failure = adopt(context);
   if (const std::string own = endWrite(context); failure.empty()) failure = own;
   activity::PathOutputs& paths = context.path_outputs;
@@ -59,6 +60,10 @@ std::string NamedOutput::poll(activity::Context& context, const std::string& why
     paths.end(context, number_);
     paths.takeWanted(number_);
     refuseCalls(why_safe);
+    if (!was_safe) {
+      state_.note =
+          fmt::format("was switched {} for safety: {}", config_.at_fault ? "on" : "off", why_safe);
+    }
     wanted_ = config_.at_fault;
   } else if (is_taken_) {
     paths.note(number_, lineForPaths(why_safe));

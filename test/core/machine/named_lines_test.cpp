@@ -128,6 +128,8 @@ TEST_F(NamedLines, OutputsAreSafeWhenAnEmergencyStopIsAnsweredAndStaySoAfterReco
   bench->machine->emergencyStop();
   expectSafe();
   EXPECT_LE(*state().changed - asked, kMillisecond);
+  EXPECT_EQ(state(0).note, "was switched off for safety: x is at fault: emergency stop");
+  EXPECT_EQ(state(1).note, "was switched on for safety: x is at fault: emergency stop");
   EXPECT_REFUSED(bench->machine->setOutput("pen", true),
                  "the output pen: x is at fault: emergency stop; call recover first");
   bench->machine->recover();
@@ -135,6 +137,7 @@ TEST_F(NamedLines, OutputsAreSafeWhenAnEmergencyStopIsAnsweredAndStaySoAfterReco
   expectSafe();
   bench->machine->setOutput("pen", true);
   EXPECT_TRUE(isOn());
+  EXPECT_EQ(state().note, "");
   EXPECT_EQ(bench->axis().wait(move).end, axis::MoveEnd::kEmergencyStop);
 }
 

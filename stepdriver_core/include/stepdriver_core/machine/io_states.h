@@ -15,7 +15,7 @@ struct OutputState {
   /// On the clock of the machine, when that write had ended; empty: it has not changed since the
   /// start.
   std::optional<pulse::Nanoseconds> changed;
-  std::string note;   ///< why it was switched off by itself; empty until that happens
+  std::string note;   ///< why nobody's command has switched it; empty until that happens
   std::string error;  ///< why its line could not be written, so that `on` isn't certain
 };
 

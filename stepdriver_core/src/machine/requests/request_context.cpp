@@ -121,9 +121,9 @@ std::string RequestContext::whySafe() const {
   if (!context.mode.closed.empty()) return context.mode.closed;
   for (const auto& axis : context.axes) {
     if (!axis->fault) continue;
-    return fmt::format("{} is at fault: {}; call recover first", axis->name(), axis->fault.what());
+    return fmt::format("{} is at fault: {}", axis->name(), axis->fault.what());
   }
-  return context.hasUnknownStop() ? "an emergency stop has come; call recover first" : "";
+  return context.hasUnknownStop() ? "an emergency stop has come" : "";
 }
 
 }  // namespace stepdriver::machine

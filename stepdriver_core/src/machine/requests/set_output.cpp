@@ -13,7 +13,10 @@ std::string SetOutput::text(const AxisWords& /*axes*/) const {
 
 void SetOutput::serve(RequestContext& machine, const SharedCall& call) const {
   const std::string why = machine.whySafe();
-  if (!why.empty()) throw Refused(fmt::format("the output {}: {}", printable(name), why));
+  if (!why.empty()) {
+    throw Refused(fmt::format("the output {}: {}{}", printable(name), why,
+                              machine.context.mode.closed.empty() ? "; call recover first" : ""));
+  }
   machine.refuseWhileEmergencyStopInput();
   machine.named.outputs.set(machine.context, name, on, call);
 }
