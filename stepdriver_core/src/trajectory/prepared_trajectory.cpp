@@ -12,6 +12,7 @@
 #include "interpolation.h"
 #include "line_path.h"
 #include "message_text.h"
+#include "microstep_shift.h"
 #include "nanoseconds.h"
 #include "point_to_point/move_between.h"
 #include "point_to_point/planner.h"
@@ -297,8 +298,11 @@ std::vector<Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
   } catch (const Malformed& error) {
     axis.refuse(error.what());
   }
-  return interpolate(source.expected[member], std::move(waypoints),
-                     axis.limits.jerk > 0.0 ? Smoothness::kJerk : Smoothness::kAcceleration);
+  const MotionState& from = source.expected[member];
+  return interpolate(
+      from,
+      shiftedToMicrosteps(from, std::move(waypoints), axis.mostAcceleration(), axis.limits.jerk),
+      axis.limits.jerk > 0.0 ? Smoothness::kJerk : Smoothness::kAcceleration);
 }
 
 MotionLimits PreparedTrajectory::motorLimits(std::size_t member) const {

@@ -226,8 +226,9 @@ std::vector<std::string> applyRobotDescription(const std::string& urdf, const st
   if (!model) {
     issues.push_back(
         {name,
-         "can't be read as a URDF; the parser's messages are above. A common reason: a prismatic "
-         "or revolute joint without <limit effort=... velocity=...>"});
+         "can't be read as a URDF; the parser's messages are above. Common reasons: a prismatic "
+         "or revolute joint without <limit effort=... velocity=...>, a number such as inf, or a "
+         "xacro file that xacro has not processed"});
     return warnings;
   }
   for (AxisConfig& axis : axes) {

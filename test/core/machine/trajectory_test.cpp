@@ -190,6 +190,31 @@ TEST_F(Trajectory, FollowsASampledTrapezoidAtTheLimits) {
   }
 }
 
+// A planner's points lie anywhere between two microsteps, and so do its first and last one.
+TEST_F(Trajectory, FollowsASampledTrapezoidAtTheLimitsBetweenMicrosteps) {
+  for (const double offset : {0.0004, -0.0003, 0.000499}) {
+    for (const bool with_accelerations : {true, false}) {
+      for (const double period : {0.1, 0.05, 0.02, 0.01}) {
+        build({trajectoryAxis("x"), trajectoryAxis("y")});
+        TrajectoryRequest request = sampledTrapezoid(period, 0.0, with_accelerations);
+        request.points.insert(request.points.begin(), {0.0, {0.0, 0.0}, {0.0, 0.0}, {}});
+        if (with_accelerations) request.points.front().accelerations = {10.0, -5.0};
+        for (motion::TrajectoryPoint& point : request.points) {
+          for (double& position : point.positions) position += offset;
+        }
+        const CoordinatedResult result = machine().wait(follow(request));
+        EXPECT_EQ(result.end, MoveEnd::kReached) << period << ' ' << offset << result.message;
+        EXPECT_EQ(bench->pulses("x"), 1000);
+        EXPECT_EQ(bench->pulses("y"), -500);
+        const test::Differences most = differences("x", 0.01);
+        EXPECT_LE(most.speed, 1.01 * 2000.0 + 1.0) << period << ' ' << offset;
+        EXPECT_LE(most.acceleration, 1.01 * 10'000.0 + 1.0) << period << ' ' << offset;
+        expectClean();
+      }
+    }
+  }
+}
+
 // A relative move counts from the position that was commanded, between two microsteps.
 TEST_F(Trajectory, LeavesTheRestOfAMicrostepToTheNextRelativeMove) {
   const std::vector<TrajectoryRequest> requests = {
