@@ -72,7 +72,7 @@ const char* const kReasons[] = {
 
 std::string firstWord(const std::string& format) { return format.substr(0, format.find(' ')); }
 
-std::string quoted(const std::string& text) { return '"' + text + '"'; }
+std::string inQuotes(const std::string& text) { return '"' + text + '"'; }
 
 }  // namespace
 
@@ -169,7 +169,7 @@ void FakeBoard::describe() {
     const bool lacks = std::find(lacking_.begin(), lacking_.end(), known.text) != lacking_.end();
     commands_.push_back(known);
     // Real numbers aren't dense, and some need two bytes.
-    if (!lacks) json += comma + quoted(known.text) + ": " + std::to_string(id);
+    if (!lacks) json += comma + inQuotes(known.text) + ": " + std::to_string(id);
     comma = ", ";
     id = id == 1 ? 70 : id + 3;
   }
@@ -178,7 +178,7 @@ void FakeBoard::describe() {
   id = 0;
   for (const char* format : kFirmwareAnswers) {
     answers_[firstWord(format)] = id;
-    json += comma + quoted(format) + ": " + std::to_string(id);
+    json += comma + inQuotes(format) + ": " + std::to_string(id);
     comma = ", ";
     id = id == 0 ? 69 : id + 3;
   }
@@ -188,7 +188,7 @@ void FakeBoard::describe() {
   id = 2;
   for (const char* reason : kReasons) {
     texts_[reason] = id;
-    json += comma + quoted(reason) + ": " + std::to_string(id++);
+    json += comma + inQuotes(reason) + ": " + std::to_string(id++);
     comma = ", ";
   }
   json += fmt::format("}}, \"pin\": {{\"gpio0\": [0, {}]}}}}}}", kind_.pins);
