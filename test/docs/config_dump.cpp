@@ -40,8 +40,9 @@ class Dump {
         tmc.hold_delay, static_cast<int>(tmc.mode), tmc.interpolate);
   }
   void add(const config::HomingConfig& homing) {
-    all(homing.at_max, homing.seek_speed, homing.latch_speed, homing.pull_off, homing.offset,
-        homing.max_travel, homing.timeout, homing.debounce, homing.order);
+    all(static_cast<int>(homing.kind), homing.at_max, homing.input, homing.approaches,
+        homing.seek_speed, homing.latch_speed, homing.pull_off, homing.final_position,
+        homing.offset, homing.max_travel, homing.timeout, homing.debounce, homing.order);
   }
   void add(const driver::Timing& timing) {
     all(timing.step_high_ns, timing.step_low_ns, timing.dir_setup_ns, timing.dir_hold_ns,
@@ -89,7 +90,8 @@ class Dump {
   void add(const setup::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,
         rig.max_switch, rig.load_falls, rig.spring_hz, rig.spring_damping,
-        rig.fail_step_write_after, rig.settling_ms, rig.faults.never_in_position);
+        rig.fail_step_write_after, rig.settling_ms, rig.faults.never_in_position, rig.block_min,
+        rig.block_max);
     all(rig.motor.pole_pairs, rig.motor.holding_torque, rig.motor.rotor_inertia,
         rig.motor.load_inertia, rig.motor.friction, rig.motor.damping);
     all(rig.wiring.dir_inverted, rig.wiring.steps_per_unit, rig.wiring.min_pin, rig.wiring.max_pin,

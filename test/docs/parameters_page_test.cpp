@@ -193,6 +193,25 @@ axes:
                       "base")};
 }
 
+/// An axis that is homed to a block.
+Node homing() {
+  return {"homing", false, readNode,
+          yaml::parse(R"(
+gpio: {backend: simulated}
+inputs: {x: {pin: T, active_level: low}}
+axes:
+  x:
+    driver: a4988
+    pins: {step: A, dir: B}
+    microsteps: 16
+    steps_per_mm: 80.0
+    max_speed_mm_s: 100.0
+    acceleration_mm_s2: 500.0
+    homing: {kind: block, towards: min, input: x, seek_speed_mm_s: 9.0, pull_off_mm: 1.0, max_travel_mm: 9.0}
+)",
+                      "base")};
+}
+
 ConfigValue scaledByRounds(const Node& node) {
   const ConfigValue steps(200);
   const ConfigValue travel(40.0);
@@ -236,6 +255,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   if (std::string(node.name) == "base") return parametersUnder("The base's node", "");
   if (std::string(node.name) == "gantry") return parametersUnder("Several motors", "axes/x/");
   if (std::string(node.name) == "uart_chip") return parametersUnder("A chip on a UART", "axes/x/");
+  if (std::string(node.name) == "homing") return parametersUnder("Kinds of homing", "axes/x/");
   if (std::string(node.name) == "corexy") return parametersUnder("Axes that share motors", "");
   std::vector<Parameter> all = parametersUnder("The node", "");
   for (const Parameter& parameter : parametersUnder("Outputs and inputs with a name", "")) {
@@ -344,6 +364,7 @@ TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
     if (GetParam().name == std::string("gantry") && map != "axes/x/motors/left") continue;
     if (GetParam().name == std::string("corexy") && map != "kinematics") continue;
     if (GetParam().name == std::string("uart_chip") && map != "axes/x/tmc") continue;
+    if (GetParam().name == std::string("homing")) continue;  // see HomingKinds
     std::set<std::string> expected = on_page;
     // An axis can be of either kind, and the message about keys of both kinds says so.
     const bool is_of_any_kind = map == "axes/x" || map == "axes/x/motors/left";
@@ -402,15 +423,34 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
     EXPECT_EQ(given.config, without.config) << parameter.key << ": " << parameter.fallback;
     ++compared;
   }
-  const bool has_few =
-      GetParam().name == std::string("corexy") || GetParam().name == std::string("uart_chip");
+  const bool has_few = GetParam().name == std::string("corexy") ||
+                       GetParam().name == std::string("uart_chip") ||
+                       GetParam().name == std::string("homing");
   EXPECT_GT(compared, has_few ? -1 : 5);
+}
+
+/// Each kind of homing has other keys.
+TEST(HomingKinds, HaveTheKeysOnThePageAndNoOthers) {
+  std::set<std::string> on_page;
+  for (const char* heading : {"An axis", "Kinds of homing"}) {
+    for (const Parameter& parameter : parametersUnder(heading, "")) {
+      if (parameter.key.rfind("homing/", 0) == 0) on_page.insert(parameter.key.substr(7));
+    }
+  }
+  std::set<std::string> known;
+  for (const std::string kind : {"limit", "block", "direct"}) {
+    Node node = homing();
+    const ConfigValue value(kind);
+    node.base = with(node.base, "axes/x/homing/kind", &value);
+    for (const std::string& key : knownIn(node, "axes/x/homing")) known.insert(key);
+  }
+  EXPECT_EQ(known, on_page);
 }
 
 std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param.name; }
 
 INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
-                         testing::Values(driver(false), driver(true), gantry(), corexy(),
+                         testing::Values(driver(false), driver(true), gantry(), corexy(), homing(),
                                          uartChip(), joystickNode(), baseNode()),
                          nameOf);
 

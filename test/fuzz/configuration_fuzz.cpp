@@ -85,10 +85,12 @@ void checkRange(const std::string& what, double value, double least, double most
 
 void checkHoming(const AxisConfig& axis) {
   const config::HomingConfig& homing = *axis.homing;
-  require((homing.at_max ? axis.endstop_max : axis.endstop_min).has_value(),
+  if (homing.kind == config::HomingKind::kDirect) return;
+  const bool is_limit = homing.kind == config::HomingKind::kLimit;
+  require(!is_limit || (homing.at_max ? axis.endstop_max : axis.endstop_min).has_value(),
           axis.name + " has the switch of its homing");
   checkRange("seek_speed", homing.seek_speed, 1e-300, axis.max_speed);
-  checkRange("latch_speed", homing.latch_speed, 1e-300, homing.seek_speed);
+  checkRange("latch_speed", homing.latch_speed, is_limit ? 1e-300 : 0.0, homing.seek_speed);
   checkRange("pull_off", homing.pull_off, 0.0, homing.max_travel);
   checkRange("max_travel", homing.max_travel * axis.steps_per_unit, 0.0, 1099511627776.0);
   checkRange("timeout", homing.timeout, 0.0, 86'400.0);

@@ -53,6 +53,7 @@ struct Goal {
   MotorsTogether motors;
   /// Its steps are never late by more than a quarter of an interval: its end measures a place.
   bool measures = false;
+  bool until_block = false;                  ///< see pulse::Follow
   std::shared_ptr<const MarksOfPath> marks;  ///< of its path; may be empty
   motion::MotionLimits path_limits;  ///< [microsteps] the limits that the path of a kTogether keeps
   /// At the target the axis waits for a path that continues its own: it isn't the end.

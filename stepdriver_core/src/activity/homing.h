@@ -8,24 +8,24 @@
 
 #include "activity.h"
 #include "motion_execution.h"
-#include "profile/shaped_profile.h"
 #include "script.h"
 #include "stepdriver_core/axis/axis_state.h"
 
 namespace stepdriver::activity {
 
 /// A homing: a sequence of strokes, each an ordinary move of the axis, and the actions at the end
-/// of each. It is a state machine driven by the engine's news, the switch and the time.
-///
-/// If the axis has several motors, each with a home switch, the homing squares them: on the way to
-/// the switches each motor stops at its own.
+/// of each. It is a state machine driven by the engine's news, the inputs and the time. Each kind
+/// of homing (config::HomingKind) finds its trigger point in a way of its own; what ends or stops a
+/// homing is the same for all of them.
 class Homing : public Activity {
  public:
   using Result = axis::Outcome<axis::HomingResult>;
 
+  /// The homing of an axis, of its configured kind.
+  ///
   /// @param outcome where its result appears.
-  Homing(Context& context, axis::AxisModel& axis, std::uint64_t id,
-         std::shared_ptr<Result> outcome);
+  static std::unique_ptr<Homing> make(Context& context, axis::AxisModel& axis, std::uint64_t id,
+                                      std::shared_ptr<Result> outcome);
 
   /// Why an axis can't be homed now. @throw Refused
   static void refuseUnlessReady(const axis::AxisModel& axis);
@@ -44,46 +44,58 @@ class Homing : public Activity {
   bool isHeld() const { return held_since_.has_value(); }
 
  protected:
+  Homing(Context& context, axis::AxisModel& axis, std::uint64_t id,
+         std::shared_ptr<Result> outcome);
+
   void onBegin(std::vector<Predecessor> predecessors) override;
   void onLook() override;
   void onEnd(const EarlyEnd& why, const SharedCall& call) override;
   void onAbandon(const EarlyEnd& why) override;
 
- private:
-  void step();
-  void strokeEnded();
-  void rested();
-  void enter(axis::HomingPhase phase);
-  void goOn();
-  void stroke(Goal goal);
-  void settle();
-  void sample();
-  void settled();
-  void keepLatch();
-  std::optional<std::int64_t> triggerEdge() const;
-  double triggerCount() const;
-  void align();
-  void pullOff();
+  /// @name What a kind of homing does. All may throw an Error, which makes the homing fail.
+  /// @{
+  /// The motor is ready. It begins its first phase.
+  virtual void start() = 0;
+  /// A stroke has ended, other than by a fault or before it began.
+  virtual void strokeEnded() = 0;
+  /// Something may have happened in a stroke, or in a pause between two.
+  virtual void look(bool /*stroke_has_ended*/) = 0;
+  /// Clock time by which look() must be called.
+  virtual pulse::Nanoseconds lookDue() const { return pulse::kNever; }
+  /// What hasn't happened yet in this phase: "the min switch didn't close".
+  virtual std::string unmet() const = 0;
+  /// @}
+
+  /// Begins a phase, whose strokes must end within max_travel. @param direction 1 or -1
+  void enter(axis::HomingPhase phase, double direction);
+  axis::HomingPhase phase() const { return phase_; }
+  /// The joint's count at which the strokes of this phase must end.
+  std::int64_t bound() const { return bound_; }
+  /// Clock time.
+  pulse::Nanoseconds phaseBegan() const { return phase_began_; }
+  void begin(Goal goal);
+  MotionExecution* stroke() { return stroke_.get(); }
+  void endStroke() { stroke_.reset(); }
+  /// The last move: from the trigger point to the final position. @param trigger [microsteps of the
+  ///   joint]
+  void pullOff(double trigger, const MotorsTogether& motors = {});
   void fail(const std::string& why, axis::HomingEnd end = axis::HomingEnd::kFailed,
             const SharedCall& call = {});
-  void succeed();
-  void conclude(const std::string& message, bool stands);
-
-  bool leaves() const;
-  bool isClosed() const;
-  bool isClosed(std::size_t side) const { return *axis_.endstopActive(side, config_.at_max); }
-  int lineOf(std::size_t side) const;
-  /// The first motor whose switch is closed or open, in words.
-  std::string switchThatIs(bool closed) const;
-  std::string timeOver() const;
+  /// The same at once, if the axis is at rest.
+  void failNow(const std::string& why);
+  /// @param skew [unit] see axis::HomingResult
+  /// @param remark continues "x is homed"; may be empty.
+  void succeed(double trigger, double skew = 0.0, const std::string& remark = "");
 
   axis::AxisModel& axis_;
   const config::HomingConfig& config_;
-  std::vector<std::size_t> sides_;  // the motors that have the home switch
-  const bool squares_;
-  const double towards_;  // 1: the count rises towards the switch; -1: it falls
-  const std::string switch_;
-  const pulse::Nanoseconds debounce_;
+  const double towards_;  // 1: the count rises towards the trigger point; -1: it falls
+
+ private:
+  void step();
+  void conclude(const std::string& message, bool stands);
+  std::string timeOver() const;
+
   const std::uint64_t id_;
   const std::shared_ptr<Result> outcome_;
 
@@ -92,29 +104,10 @@ class Homing : public Activity {
   std::string failure_;
   pulse::Nanoseconds deadline_ = 0;
   std::optional<pulse::Nanoseconds> held_since_;
-
   Steps waking_;
   std::unique_ptr<MotionExecution> stroke_;  // under way
-  std::int64_t bound_ = 0;  // the joint's count at which the strokes of this phase must end
-  bool slowing_ = false;    // the switch has opened
+  std::int64_t bound_ = 0;
   pulse::Nanoseconds phase_began_ = 0;
-
-  // While the switch settles.
-  bool settling_ = false;
-  bool closed_ = false;
-  pulse::Nanoseconds settle_began_ = 0;
-  pulse::Nanoseconds steady_since_ = 0;
-
-  // The motion of the latch, and how it ended.
-  std::optional<motion::PlannedMotion> latch_;
-  pulse::ChannelState latched_;
-  pulse::Nanoseconds slipped_before_ = 0;
-  pulse::Nanoseconds slipped_ = 0;
-  double trigger_ = 0.0;  // [microsteps] the joint's position
-
-  // Only for motors that are made square.
-  std::vector<std::size_t> to_align_;  // those that still have to move alone
-  std::int64_t skew_ = 0;              // [microsteps] the skew that this homing has made up
 };
 
 }  // namespace stepdriver::activity

@@ -73,6 +73,8 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
       return {axis::MoveEnd::kFault, faultThatEnded(axis)};
     case pulse::EndReason::kSkewed:
       return {axis::MoveEnd::kStopped, "its motors got too far apart"};
+    case pulse::EndReason::kBlocked:
+      return {axis::MoveEnd::kStopped, "its motor was blocked"};
     case pulse::EndReason::kCompanion:
       break;
   }
@@ -328,6 +330,7 @@ void MotionExecution::order(Plans plans, const SharedCall& extension) {
     follow.still = orders_[i].goal.motors.still;
     follow.squares = orders_[i].goal.motors.square;
     follow.is_square = orders_[i].goal.motors.are_square;
+    follow.until_block = orders_[i].goal.until_block;
   }
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     Order& order = orders_[i];

@@ -62,6 +62,11 @@ struct ChannelConfig : MotorSignals {
   std::int64_t max_skew = 0;
   /// A fault doesn't end a motion that has made a step: it is only counted, and a stop is expected.
   bool ramps_at_fault = false;
+  /// An input that is active, for an instant or longer, when the motor is blocked. It ends motions
+  /// that are made until then (Follow::until_block) as kBlocked.
+  std::optional<Signal> block;
+  /// The fault outputs are such inputs. In these motions that is no fault.
+  bool block_is_fault = false;
   Nanoseconds in_position_timeout = 0;
   /// `step` makes steps forward, and pulses on `dir`, which is no level then, make steps backward.
   /// dir_setup and dir_hold are kept between the pulses of the two.

@@ -19,6 +19,7 @@ enum class EndReason {
   kNotInPosition,  ///< the in-position output didn't become active in time
   kCompanion,      ///< another channel of the group was ended
   kSkewed,         ///< motors that square got too far apart: those that still move met no switch
+  kBlocked,        ///< the motor was reported to be blocked, see ChannelConfig::block
 };
 
 /// A write or a read that failed.

@@ -2,12 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "bounds.h"
 #include "message_text.h"
 #include "motion_keys.h"
+#include "printable.h"
 #include "read_motion.h"
 #include "restart_speed.h"
 
@@ -17,6 +21,10 @@ namespace {
 constexpr double kLongestDebounceMs = 1000.0;
 constexpr int kHighestOrder = 1000;
 
+// In the order of HomingKind.
+const std::vector<std::string> kKinds = {"limit", "block", "direct"};
+const std::vector<std::string> kEnds = {"min", "max"};
+
 /// Whether the trigger of the homing lies so far inside the soft limit at its end that the axis,
 /// pulled off, hasn't left the part between the two: no motion gets there, because the switch is an
 /// endstop.
@@ -25,7 +33,8 @@ bool triggersInside(const AxisConfig& axis, const HomingConfig& homing) {
   if (!limit) return false;
   const double inside = homing.at_max ? *limit - homing.offset : homing.offset - *limit;
   const double step = axis.steps_per_unit > 0.0 ? 1.0 / axis.steps_per_unit : 0.0;
-  return inside > homing.pull_off + step;
+  const double way = std::abs(restOf(homing) - homing.offset);
+  return inside > (homing.final_position ? way : homing.pull_off) + step;
 }
 
 class HomingReader {
@@ -34,16 +43,17 @@ class HomingReader {
       : axis_(axis), homing_(axis.map("homing")), keys_(keys), config_(config) {}
 
   HomingConfig read() {
-    HomingConfig homing;
-    const bool has_switch = readSwitch(homing);
-    readSpeeds(homing);
-    readDistances(homing, has_switch);
-    homing.timeout = homing_.number("timeout_s", {0.0, kLongestTime, true}, homing.timeout);
-    homing.debounce =
-        homing_.number("debounce_ms", {0.0, kLongestDebounceMs}, homing.debounce * 1e3) * 1e-3;
-    homing.order = homing_.integer("order", 0, kHighestOrder, homing.order);
+    const std::string kind = homing_.oneOf("kind", kKinds, kKinds.front());
+    result_.kind =
+        static_cast<HomingKind>(std::find(kKinds.begin(), kKinds.end(), kind) - kKinds.begin());
+    result_.order = homing_.integer("order", 0, kHighestOrder, result_.order);
+    if (result_.kind == HomingKind::kDirect) {
+      if (readOffset(true)) checkWithinLimits(inUnit("offset"), result_.offset);
+    } else {
+      readMotion();
+    }
     homing_.rejectUnknown();
-    return homing;
+    return result_;
   }
 
  private:
@@ -53,19 +63,51 @@ class HomingReader {
   void mustBe(const std::string& key, const std::string& wanted) {
     homing_.issue(key, fmt::format("is {}, but must be {}", homing_.shown(key), wanted));
   }
+  bool isLimit() const { return result_.kind == HomingKind::kLimit; }
+
+  void readMotion() {
+    const bool has_end = isLimit() ? readSwitch() : readDirection();
+    if (result_.kind == HomingKind::kBlock) readBlock();
+    readSpeeds();
+    readDistances(has_end);
+    result_.timeout = homing_.number("timeout_s", {0.0, kLongestTime, true}, result_.timeout);
+    if (!isLimit()) return;
+    result_.debounce =
+        homing_.number("debounce_ms", {0.0, kLongestDebounceMs}, result_.debounce * 1e3) * 1e-3;
+  }
 
   /// @return whether it is right.
-  bool readSwitch(HomingConfig& homing) {
-    const auto which =
-        homing_.findOneOf("switch", std::vector<std::string>{"min", "max"}, Presence::kRequired);
+  bool readSwitch() {
+    const auto which = homing_.findOneOf("switch", kEnds, Presence::kRequired);
     if (!which) return false;
-    homing.at_max = *which == "max";
-    if (config_.hasEndstop(homing.at_max)) return true;
+    result_.at_max = *which == "max";
+    if (config_.hasEndstop(result_.at_max)) return true;
     homing_.contradiction(
         "switch",
         fmt::format("is {}, but must be a switch that the axis has: endstops/{} is missing",
                     homing_.shown("switch"), *which));
     return false;
+  }
+
+  /// @return as above
+  bool readDirection() {
+    const auto towards = homing_.findOneOf("towards", kEnds, Presence::kRequired);
+    result_.at_max = towards && *towards == "max";
+    return towards.has_value();
+  }
+
+  void readBlock() {
+    result_.input = homing_.text("input", "");
+    bool has_faults = true;
+    for (std::size_t i = 0; i < config_.motors(); ++i) {
+      has_faults = has_faults && config_.motorAt(i).fault;
+    }
+    if (result_.input.empty() && !has_faults) {
+      homing_.contradiction("input",
+                            "is missing, but something must tell that the motor is "
+                            "blocked: a name of `inputs`, or pins/fault of each motor");
+    }
+    result_.approaches = homing_.integer("approaches", 1, 2, result_.approaches);
   }
 
   std::optional<double> readSpeed(const std::string& key, double highest, const std::string& what) {
@@ -79,14 +121,17 @@ class HomingReader {
     return speed;
   }
 
-  void readSpeeds(HomingConfig& homing) {
+  void readSpeeds() {
     const std::string seek_key = inUnit("seek_speed") + "_s";
     const std::string latch_key = inUnit("latch_speed") + "_s";
     const auto seek =
         readSpeed(seek_key, units(config_.max_speed),
                   fmt::format("{}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
-    // The count stays correct at the switch only at a speed from which the motor stops at once.
-    const bool known = config_.steps_per_unit > 0.0 && config_.acceleration > 0.0;
+    result_.seek_speed = si(seek.value_or(0.0));
+    if (result_.kind == HomingKind::kBlock && result_.approaches == 1) return;
+    // The count stays correct at the switch only at a speed from which the motor stops at once. A
+    // motor that is blocked has stopped.
+    const bool known = isLimit() && config_.steps_per_unit > 0.0 && config_.acceleration > 0.0;
     const double restart = known ? units(restartSpeed(config_)) : 0.0;
     const auto latch = readSpeed(latch_key, restart,
                                  fmt::format("{}, the speed that the motor stops from without a "
@@ -95,55 +140,73 @@ class HomingReader {
     if (seek && latch && *latch > *seek) {
       mustBe(latch_key, fmt::format("at most {}, which is {}", seek_key, homing_.shown(seek_key)));
     }
-    homing.seek_speed = si(seek.value_or(0.0));
-    homing.latch_speed = si(latch.value_or(0.0));
+    result_.latch_speed = si(latch.value_or(0.0));
   }
 
-  void readDistances(HomingConfig& homing, bool has_switch) {
+  /// @return whether it is right.
+  bool readOffset(bool required) {
+    const std::string key = inUnit("offset");
+    const auto offset =
+        homing_.findNumber(key, Range{}, required ? Presence::kRequired : Presence::kOptional);
+    result_.offset = si(offset.value_or(0.0));
+    return offset.has_value() == homing_.has(key);
+  }
+
+  void readDistances(bool has_end) {
     const std::string travel_key = inUnit("max_travel");
     const std::string pull_off_key = inUnit("pull_off");
+    const std::string final_key = inUnit("final_position");
     const auto travel = homing_.findNumber(travel_key, Range::positive(), Presence::kRequired);
     const double steps = config_.steps_per_unit / units(1.0);
     if (travel && steps > 0.0 && *travel * steps > kFarthestTravel * kSlack) {
       mustBe(travel_key, fmt::format("at most {}, which is 2^40 steps",
                                      upperBoundText(kFarthestTravel / steps)));
     }
+    const auto final_position = homing_.findNumber(final_key, Range{}, Presence::kOptional);
+    const bool backs_off = result_.kind == HomingKind::kBlock && result_.approaches == 2;
+    const bool needs_pull_off = !homing_.has(final_key) || backs_off;
     const auto pull_off =
-        homing_.findNumber(pull_off_key, Range::notNegative(), Presence::kRequired);
+        homing_.findNumber(pull_off_key, Range::notNegative(),
+                           needs_pull_off ? Presence::kRequired : Presence::kOptional);
     const bool too_far = travel && pull_off && *pull_off > *travel;
     if (too_far) {
       mustBe(pull_off_key,
              fmt::format("at most {}, which is {}", travel_key, homing_.shown(travel_key)));
     }
-    const std::string offset_key = inUnit("offset");
-    const auto offset = homing_.findNumber(offset_key, Range{}, Presence::kOptional);
-    homing.max_travel = si(travel.value_or(0.0));
-    homing.pull_off = si(pull_off.value_or(0.0));
-    homing.offset = si(offset.value_or(0.0));
-    const bool all_right = pull_off && !too_far && offset.has_value() == homing_.has(offset_key);
-    if (has_switch && all_right) checkRest(homing, offset_key);
+    if (backs_off && pull_off && *pull_off == 0.0) {
+      mustBe(pull_off_key, "above 0, from where the second approach begins");
+    }
+    result_.max_travel = si(travel.value_or(0.0));
+    result_.pull_off = si(pull_off.value_or(0.0));
+    if (final_position) result_.final_position = si(*final_position);
+    const bool all_right = readOffset(false) && pull_off.has_value() == homing_.has(pull_off_key) &&
+                           !too_far && final_position.has_value() == homing_.has(final_key) &&
+                           (pull_off || final_position);
+    if (has_end && all_right) checkRest();
   }
 
-  /// The axis must be able to move from its position after the homing.
-  void checkRest(const HomingConfig& homing, const std::string& offset_key) {
-    const double rest = restOf(homing);
+  /// The axis must be able to move from its position after the result_.
+  void checkRest() {
+    if (result_.final_position) return checkFinalPosition();
+    const std::string offset_key = inUnit("offset");
+    const double rest = restOf(result_);
     const std::string stands =
         homing_.has(offset_key) ? "is " + homing_.shown(offset_key) : "is missing, and so 0";
-    if (triggersInside(config_, homing)) {
-      const std::string limit = homing.at_max ? keys_.max_position : keys_.min_position;
+    if (isLimit() && triggersInside(config_, result_)) {
+      const std::string limit = result_.at_max ? keys_.max_position : keys_.min_position;
       const double clear =
-          homing.at_max ? homing.offset + homing.pull_off : homing.offset - homing.pull_off;
+          result_.at_max ? result_.offset + result_.pull_off : result_.offset - result_.pull_off;
       return homing_.issue(
           offset_key,
           fmt::format(
               "{}, so that nothing of the way between the {} switch and {}, which is {}, "
               "can be reached, because no motion passes an endstop; it must be {} {}, or {} "
               "must be {} {}",
-              stands, homing.at_max ? "max" : "min", limit, axis_.shown(limit),
-              homing.at_max ? "at least" : "at most",
-              roughText(units(homing.at_max ? *config_.max_position - homing.pull_off
-                                            : *config_.min_position + homing.pull_off)),
-              limit, homing.at_max ? "at most" : "at least", roughText(units(clear))));
+              stands, result_.at_max ? "max" : "min", limit, axis_.shown(limit),
+              result_.at_max ? "at least" : "at most",
+              roughText(units(result_.at_max ? *config_.max_position - result_.pull_off
+                                             : *config_.min_position + result_.pull_off)),
+              limit, result_.at_max ? "at most" : "at least", roughText(units(clear))));
     }
     const auto check = [&](const std::optional<double>& limit, bool beyond, const char* word,
                            const std::string& key) {
@@ -160,10 +223,35 @@ class HomingReader {
           keys_.max_position);
   }
 
+  double step() const { return config_.steps_per_unit > 0.0 ? 1.0 / config_.steps_per_unit : 0.0; }
+
+  void checkWithinLimits(const std::string& key, double position) {
+    if (config_.min_position && position < *config_.min_position - step()) {
+      mustBe(key, fmt::format("at least {}, which is {}", keys_.min_position,
+                              axis_.shown(keys_.min_position)));
+    }
+    if (config_.max_position && position > *config_.max_position + step()) {
+      mustBe(key, fmt::format("at most {}, which is {}", keys_.max_position,
+                              axis_.shown(keys_.max_position)));
+    }
+  }
+
+  /// Beyond the trigger point is what stops the axis.
+  void checkFinalPosition() {
+    const std::string key = inUnit("final_position");
+    const double position = *result_.final_position;
+    checkWithinLimits(key, position);
+    const double beyond = result_.at_max ? position - result_.offset : result_.offset - position;
+    if (beyond <= step()) return;
+    mustBe(key, fmt::format("{} {}, which is {}", result_.at_max ? "at most" : "at least",
+                            inUnit("offset"), roughText(units(result_.offset))));
+  }
+
   ConfigReader& axis_;
   ConfigReader homing_;
   const MotionKeys& keys_;
   const AxisConfig& config_;
+  HomingConfig result_;
 };
 
 }  // namespace
@@ -172,8 +260,31 @@ std::string homingKey(const char* what, Kind kind) {
   return std::string(what) + (kind == Kind::kLinear ? "_mm" : "_deg");
 }
 
+const std::string& textOf(HomingKind kind) { return kKinds.at(static_cast<std::size_t>(kind)); }
+
 double restOf(const HomingConfig& homing) {
+  if (homing.final_position) return *homing.final_position;
   return homing.offset + (homing.at_max ? -homing.pull_off : homing.pull_off);
+}
+
+void checkHomingInputs(const std::vector<AxisConfig>& axes, const std::vector<InputConfig>& inputs,
+                       const std::string& name, std::vector<ConfigIssue>& issues) {
+  for (const AxisConfig& axis : axes) {
+    if (!axis.homing || axis.homing->input.empty()) continue;
+    const std::string& wanted = axis.homing->input;
+    const bool is_there = std::any_of(inputs.begin(), inputs.end(), [&](const InputConfig& input) {
+      return input.name == wanted;
+    });
+    if (is_there) continue;
+    std::vector<std::string> names;
+    names.reserve(inputs.size());
+    for (const InputConfig& input : inputs) names.push_back(input.name);
+    issues.push_back(
+        {fmt::format("{}/{}/homing/input", name, axis.name),
+         fmt::format("is \"{}\", but must be the name of an input: {}", printable(wanted),
+                     names.empty() ? "there is no `inputs`" : listText(names, "or")),
+         true});
+  }
 }
 
 void readHoming(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {

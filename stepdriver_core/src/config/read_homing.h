@@ -2,8 +2,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "config/config_reader.h"
+#include "stepdriver_core/config/io_config.h"
+#include "stepdriver_core/error.h"
 
 namespace stepdriver::config {
 
@@ -12,6 +15,16 @@ std::string homingKey(const char* what, Kind kind);
 
 /// [unit] Where the axis stands when it has been homed.
 double restOf(const HomingConfig& homing);
+
+/// The kind as configurations name it: "limit".
+const std::string& textOf(HomingKind kind);
+
+/// Checks that the homings name inputs that are there.
+///
+/// @param name full name of the map of axes.
+/// @param issues every mistake is added here.
+void checkHomingInputs(const std::vector<AxisConfig>& axes, const std::vector<InputConfig>& inputs,
+                       const std::string& name, std::vector<ConfigIssue>& issues);
 
 /// Reads `homing` and `require_homing`.
 ///

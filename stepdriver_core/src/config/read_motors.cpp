@@ -115,7 +115,7 @@ class SquaringReader {
       "home end";
 
   std::size_t homeSwitches() const {
-    if (!config_.homing) return 0;
+    if (!config_.homing || config_.homing->kind != HomingKind::kLimit) return 0;
     std::size_t switches = 0;
     for (std::size_t i = 0; i < config_.motors(); ++i) {
       const MotorConfig& motor = config_.motorAt(i);

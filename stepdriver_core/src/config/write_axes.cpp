@@ -167,15 +167,22 @@ class AxisWriter {
 
   ConfigValue::Map writeHoming(const HomingConfig& homing) const {
     const auto key = [this](const char* what) { return homingKey(what, axis_.kind); };
-    return {{"switch", homing.at_max ? "max" : "min"},
-            {key("seek_speed") + "_s", units(homing.seek_speed)},
-            {key("latch_speed") + "_s", units(homing.latch_speed)},
-            {key("pull_off"), units(homing.pull_off)},
-            {key("offset"), units(homing.offset)},
-            {key("max_travel"), units(homing.max_travel)},
-            {"timeout_s", homing.timeout},
-            {"debounce_ms", homing.debounce * 1e3},
-            {"order", homing.order}};
+    ConfigValue::Map map{{"kind", textOf(homing.kind)},
+                         {key("offset"), units(homing.offset)},
+                         {"order", homing.order}};
+    if (homing.kind == HomingKind::kDirect) return map;
+    const bool is_limit = homing.kind == HomingKind::kLimit;
+    map[is_limit ? "switch" : "towards"] = homing.at_max ? "max" : "min";
+    map[key("seek_speed") + "_s"] = units(homing.seek_speed);
+    map[key("pull_off")] = units(homing.pull_off);
+    map[key("max_travel")] = units(homing.max_travel);
+    map["timeout_s"] = homing.timeout;
+    if (homing.final_position) map[key("final_position")] = units(*homing.final_position);
+    if (is_limit) map["debounce_ms"] = homing.debounce * 1e3;
+    if (!homing.input.empty()) map["input"] = homing.input;
+    if (homing.kind == HomingKind::kBlock) map["approaches"] = homing.approaches;
+    if (homing.latch_speed > 0.0) map[key("latch_speed") + "_s"] = units(homing.latch_speed);
+    return map;
   }
 
   const AxisConfig& axis_;

@@ -16,7 +16,7 @@ AxisGuard::AxisGuard(const ChannelConfig& config, ChannelState& state, WatchedLi
       lines_(lines),
       all_motors_(static_cast<MotorSet>(motorBit(motors()) - 1)),
       has_switch_(has(&MotorSignals::endstop_min) || has(&MotorSignals::endstop_max)),
-      idle_(!has_switch_ && !has(&MotorSignals::fault) && config.twins.empty()) {}
+      idle_(!has_switch_ && !has(&MotorSignals::fault) && !config.block && config.twins.empty()) {}
 
 bool AxisGuard::has(std::optional<Signal> MotorSignals::*signal) const {
   for (std::size_t i = 0; i < motors(); ++i) {
@@ -25,9 +25,11 @@ bool AxisGuard::has(std::optional<Signal> MotorSignals::*signal) const {
   return false;
 }
 
-void AxisGuard::begin(bool squares, bool is_square) {
-  squares_ = squares;
-  if (is_square) square_lags_ = state_.lags;
+void AxisGuard::begin(const Manner& manner, Nanoseconds now) {
+  squares_ = manner.squares;
+  until_block_ = manner.until_block;
+  began_ = now;
+  if (manner.is_square) square_lags_ = state_.lags;
 }
 
 void AxisGuard::reserve() {
@@ -50,6 +52,7 @@ std::optional<Objection> AxisGuard::readFault(std::size_t number) {
   faulty_ ^= motorBit(number);
   if (!faulty) return std::nullopt;
   if (level < 0) return Objection{EndReason::kLineError, {-level, fault->line, true}};
+  if (until_block_ && config_.block_is_fault) return Objection{EndReason::kBlocked, {}};
   countFault(number);
   return Objection{EndReason::kChipFault, {}};
 }
@@ -66,6 +69,10 @@ void AxisGuard::countFault(std::size_t number) {
 }
 
 std::optional<Objection> AxisGuard::mayStep(int direction) {
+  // What has reported a block ends its report in the motion off it.
+  for (std::size_t i = 0; config_.block_is_fault && faulty_ != 0 && i < motors(); ++i) {
+    if ((faulty_ & motorBit(i)) != 0) readFault(i);
+  }
   if (has_switch_ && direction != 0) {
     for (std::size_t i = 0; i < motors(); ++i) {
       if ((state_.still & motorBit(i)) != 0) continue;
@@ -75,7 +82,21 @@ std::optional<Objection> AxisGuard::mayStep(int direction) {
   if (squares_ && state_.still != 0 && wouldSkew(direction)) {
     return Objection{EndReason::kSkewed, {}};
   }
-  return std::nullopt;
+  return until_block_ ? readBlock() : std::nullopt;
+}
+
+// The report of a block may be shorter than the time between two steps: then only its edge tells.
+std::optional<Objection> AxisGuard::readBlock() {
+  for (std::size_t i = 0; config_.block_is_fault && i < motors(); ++i) {
+    if (auto objection = readFault(i)) return objection;
+  }
+  if (!config_.block) return std::nullopt;
+  const int level = lines_.read(config_.block->line);
+  if (level < 0) return Objection{EndReason::kLineError, {-level, config_.block->line, true}};
+  const bool is_blocked = (level != 0) == config_.block->active ||
+                          block_edge_.load(std::memory_order_acquire) >= began_;
+  if (!is_blocked) return std::nullopt;
+  return Objection{EndReason::kBlocked, {}};
 }
 
 // A motor that squares stops at its own switch, and the others continue.

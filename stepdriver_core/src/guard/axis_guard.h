@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 
@@ -31,10 +32,15 @@ class AxisGuard {
   /// @{
   std::size_t motors() const { return 1 + config_.twins.size(); }
   bool has(std::optional<Signal> MotorSignals::*signal) const;
-  /// A motion begins from rest.
-  /// @param squares, is_square see Follow.
-  void begin(bool squares, bool is_square);
-  void end() { squares_ = settling_ = false; }
+  /// How a motion from rest is made, see Follow.
+  struct Manner {
+    bool squares = false;
+    bool is_square = false;
+    bool until_block = false;
+  };
+  /// A motion begins from rest. @param now clock time.
+  void begin(const Manner& manner, Nanoseconds now);
+  void end() { squares_ = until_block_ = settling_ = false; }
   /// @}
 
   /// @name Reservation, while the chip's other pins are being written
@@ -60,6 +66,9 @@ class AxisGuard {
   /// @{
   /// Reads the switches of its motors in a direction. @param direction +1, -1 or 0
   std::optional<Objection> mayStep(int direction);
+  /// The input that tells of a block has become active at a clock time. It may be inactive again by
+  /// the next step. From any thread.
+  void noteBlock(Nanoseconds time) { block_edge_.store(time, std::memory_order_release); }
   /// @}
 
   /// @name The end of a profile that settles
@@ -82,6 +91,7 @@ class AxisGuard {
     return number == 0 ? config_ : config_.twins[number - 1];
   }
   std::optional<Objection> readSwitch(std::size_t motor, bool forward);
+  std::optional<Objection> readBlock();
   void countFault(std::size_t motor);
   bool wouldSkew(int direction) const;
   std::int64_t skewAfter(int direction) const;
@@ -93,6 +103,9 @@ class AxisGuard {
   const bool has_switch_;
   const bool idle_;
   bool squares_ = false;  // the current motion does
+  bool until_block_ = false;
+  Nanoseconds began_ = 0;  // clock time
+  std::atomic<Nanoseconds> block_edge_{-1};
   bool reserved_ = false;
   bool unchecked_ = false;
   MotorSet faulty_ = 0;        // the motors with a fault, by the last readings of the fault lines

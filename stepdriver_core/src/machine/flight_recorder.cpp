@@ -152,6 +152,8 @@ const char* textOf(pulse::EndReason reason) {
       return "was not in position in time after its end";
     case pulse::EndReason::kSkewed:
       return "was ended because its motors got too far apart";
+    case pulse::EndReason::kBlocked:
+      return "was ended because the motor was blocked";
     case pulse::EndReason::kCompanion:
       return "was ended together with another axis";
   }

@@ -8,6 +8,7 @@
 
 #include "config/check_axes.h"
 #include "config/read_axes.h"
+#include "config/read_homing.h"
 #include "config/read_io.h"
 #include "config/write_axes.h"
 #include "printable.h"
@@ -215,6 +216,7 @@ void checkConfiguration(const std::vector<config::AxisConfig>& axes,
   config::UsedLines used(issues);
   config::checkAxes(axes, issues, used);
   checkOptions(issues.empty() ? &axes : nullptr, options, issues, used);
+  config::checkHomingInputs(axes, options.inputs, "axes", issues);
   if (issues.empty()) return;
   for (ConfigIssue& issue : issues) issue.key.erase(0, issue.key.find_first_not_of('/'));
   throw ConfigError(std::move(issues));

@@ -43,6 +43,8 @@ std::string ShellCore::post(activity::CallId call, Request request) {
 }
 
 bool ShellCore::watchInputs(const gpio::EdgeEvent* edges, int count) {
+  for (int i = 0; i < count; ++i)
+    engine_.noteEdge(edges[i].input, edges[i].level, edges[i].time_ns);
   const InputReading reading = readInputs();
   const std::lock_guard<std::mutex> lock(mutex_);
   for (int i = 0; i < count; ++i) seen_.emplace_back(InputEdge{edges[i]});

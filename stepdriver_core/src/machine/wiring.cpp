@@ -74,6 +74,21 @@ Wiring::Wiring(const std::vector<config::AxisConfig>& axes, const MachineOptions
     named_inputs.push_back(static_cast<int>(inputs.size()));
     inputs.push_back({input.line.line, input.line.bias, true});
   }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i].homing) connectHoming(*axes[i].homing, options, i);
+  }
+}
+
+void Wiring::connectHoming(const config::HomingConfig& homing, const MachineOptions& options,
+                           std::size_t axis) {
+  for (std::size_t i = 0; i < options.inputs.size(); ++i) {
+    const config::InputConfig& input = options.inputs[i];
+    if (input.name != homing.input) continue;
+    motor_lines[axis].homing_input = pulse::Signal{named_inputs[i], input.line.active_level};
+  }
+  if (homing.kind != config::HomingKind::kBlock) return;
+  channels[axis].block = motor_lines[axis].homing_input;
+  channels[axis].block_is_fault = homing.input.empty();
 }
 
 std::vector<pulse::OutputLine> Wiring::switchedOutputs(const MachineOptions& options) const {

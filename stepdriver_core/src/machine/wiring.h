@@ -44,6 +44,10 @@ struct Wiring {
     return {NamedOutputs(options.outputs, named_outputs),
             NamedInputs(options.inputs, named_inputs)};
   }
+
+ private:
+  void connectHoming(const config::HomingConfig& homing, const MachineOptions& options,
+                     std::size_t axis);
 };
 
 /// How long the ramp of an emergency stop may take: the longest deceleration from the top speed of

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "channel/channel_config.h"
@@ -32,6 +33,8 @@ struct MotorLines : ChipLines {
   std::vector<ChipLines> twins;
   int brake = -1;
   bool cw_ccw = false;  ///< `step` is CW, and `dir` is CCW
+  /// HomingConfig::input, which isn't a line of the axis alone.
+  std::optional<pulse::Signal> homing_input;
 
   std::size_t motors() const { return 1 + twins.size(); }
   const ChipLines& motorAt(std::size_t index) const {

@@ -53,10 +53,11 @@ class StepPort {
   };
 
   /// For ports with a horizon: how the motors of an axis make a motion, see Follow.
-  struct Squaring {
-    MotorSet still = 0;      ///< these make no steps
-    bool squares = false;    ///< each stops at its own switch, and the others continue
-    bool is_square = false;  ///< their skew counts from here
+  struct Manner {
+    MotorSet still = 0;        ///< these make no steps
+    bool squares = false;      ///< each stops at its own switch, and the others continue
+    bool is_square = false;    ///< their skew counts from here
+    bool until_block = false;  ///< it ends when the motor is blocked
   };
 
   /// A condition that a step didn't fulfil.
@@ -132,11 +133,14 @@ class StepPort {
   ///   two get further apart than ChannelConfig::max_skew.
   /// - No step goes out to a motor whose chip's fault output is active, unless
   ///   ChannelConfig::ramps_at_fault.
+  /// - In a motion that is made until a block, no step goes out once ChannelConfig::block was
+  /// active
+  ///   in it, for however short a time.
   /// Channels that end together with a stopped one play on until their steps are taken back.
   virtual Nanoseconds horizon() const = 0;
 
   /// A motion of an axis begins from rest. @pre No step of it is open.
-  virtual void begin(std::size_t /*channel*/, const Squaring& /*squaring*/) {}
+  virtual void begin(std::size_t /*channel*/, const Manner& /*manner*/) {}
 
   /// The direction of the next step, if the lane doesn't accept it; 0: none is to be expected.
   /// @pre The lane isn't busy, and no step of it is open.

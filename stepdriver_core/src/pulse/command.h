@@ -40,14 +40,16 @@ struct Follow {
   /// [microsteps] A full step: steps may be late by ChannelConfig::late_steps of it. 0: each step
   /// may only be late by a quarter of its interval.
   int full_step = 0;
-  /// @name Orders from rest to an axis with several motors; profiles that continue them keep these
+  /// @name Orders from rest; profiles that continue them keep these. All but the last are for an axis
+  ///   with several motors.
   /// @{
   MotorSet still = 0;  ///< these motors make no steps
   /// Each motor stops at its own endstop, and the others continue. The motion ends as at an endstop
   /// when all motors have stopped, and as kSkewed if they get too far apart
   /// (ChannelConfig::max_skew). A motor without an endstop in the direction continues to the end.
   bool squares = false;
-  bool is_square = false;  ///< the motors are square: their skew counts from here
+  bool is_square = false;    ///< the motors are square: their skew counts from here
+  bool until_block = false;  ///< it ends when the motor is blocked, see ChannelConfig::block
   /// @}
 };
 

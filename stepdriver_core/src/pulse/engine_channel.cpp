@@ -60,13 +60,13 @@ void SumKin::halted() {
   }
 }
 
-void EngineChannel::follow(const Follow& order) {
+void EngineChannel::follow(const Follow& order, Nanoseconds now) {
   group = order.group;
   slows = order.slows;
   const bool from_rest = !motion->follows();
   if (from_rest) {
     state.still = order.still;
-    guard.begin(order.squares, order.is_square);
+    guard.begin({order.squares, order.is_square, order.until_block}, now);
     if (!kin->follows()) {
       for (EngineChannel* channel : kin->all) channel->late = channel->behind = 0;
     }

@@ -83,7 +83,8 @@ struct EngineChannel {
 
   /// Until the last open step of a motion that has ended is over, only its steps are told.
   void publish() { kin->drains ? published.storeFirst<kStepBytes>(state) : published.store(state); }
-  void follow(const Follow& order);
+  /// @param now clock time.
+  void follow(const Follow& order, Nanoseconds now);
   void release(const Command& command);
   /// Another profile is followed. @param told whether to say so at once: the steps of the one
   ///   before it have been played.

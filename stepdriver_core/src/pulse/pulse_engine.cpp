@@ -296,9 +296,9 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
     const Follow& order = command.follows[i];
     Channel& channel = *channels_[static_cast<std::size_t>(order.channel)];
     if (horizon_ != 0 && !channel.motion->follows()) {
-      port_.begin(channel.index, {order.still, order.squares, order.is_square});
+      port_.begin(channel.index, {order.still, order.squares, order.is_square, order.until_block});
     }
-    channel.follow(order);
+    channel.follow(order, now);
     channel.state.accepted = order.serial;
     changed(channel);
   }
@@ -350,6 +350,13 @@ void PulseEngine::serveStops() {
 void PulseEngine::inputsChanged() {
   inputs_changed_.store(true, std::memory_order_release);
   clock_.wake();
+}
+
+void PulseEngine::noteEdge(int input, bool level, Nanoseconds time) {
+  for (const auto& channel : channels_) {
+    const auto& block = channel->config.block;
+    if (block && block->line == input && block->active == level) channel->guard.noteBlock(time);
+  }
 }
 
 void PulseEngine::readEmergencyStop() {

@@ -105,6 +105,9 @@ class PulseEngine : private StepPort::Listener {
   /// Some input may have changed: the engine reads the relevant ones and acts on them. Extra calls
   /// do no harm. A change without a call is seen before the next step that depends on it.
   void inputsChanged();
+  /// An input has changed. From any thread, before inputsChanged().
+  /// @param time clock time of the edge.
+  void noteEdge(int input, bool level, Nanoseconds time);
 
   /// @name Emergency stops No motion is followed while more were requested than cleared, see
   ///   StopCounts.

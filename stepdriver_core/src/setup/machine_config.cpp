@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/read_axes.h"
+#include "config/read_homing.h"
 #include "config/read_io.h"
 #include "config/read_kinematics.h"
 #include "machine/read_options.h"
@@ -110,6 +111,7 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   config.heartbeat = machine::readHeartbeat(reader, used);
   config.outputs = config::readOutputs(reader, used);
   config.inputs = config::readInputs(reader, used);
+  config::checkHomingInputs(config.axes, config.inputs, reader.fullName("axes"), reader.issues());
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !config.emergency_stop) {
     simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",

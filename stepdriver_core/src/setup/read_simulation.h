@@ -27,6 +27,8 @@ namespace stepdriver::setup {
 ///       switch_hysteresis_mm: 0.0
 ///       bounces: 0
 ///       bounce_ms: 0.2
+///       block_min_mm: -5.0       # a block that stops the carriage; default: none
+///       block_max_mm: 205.0
 ///       settling_ms: 10.0        # until the in-position output is active after a pulse
 ///       never_in_position: false # true: it stays inactive
 ///       load_falls_mm_s: 0.0     # how fast the load sinks towards min while nothing holds it

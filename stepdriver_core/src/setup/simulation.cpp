@@ -86,7 +86,23 @@ AxisConfig motorAlone(const AxisConfig& axis, std::size_t motor) {
   return alone;
 }
 
-sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& simulated) {
+/// A homing to a block has an input that reports it.
+void reportBlock(const AxisConfig& axis, const std::vector<config::InputConfig>& inputs,
+                 sim::RigAxisSpec& spec) {
+  if (!axis.homing || axis.homing->kind != config::HomingKind::kBlock) return;
+  if (axis.homing->input.empty()) {
+    spec.stall_line = spec.fault_line;
+    spec.stall_active = axis.driver.fault_active.value_or(false);
+  }
+  for (const config::InputConfig& input : inputs) {
+    if (input.name != axis.homing->input) continue;
+    spec.stall_line = input.line.line;
+    spec.stall_active = input.line.active_level;
+  }
+}
+
+sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& simulated,
+                           const std::vector<config::InputConfig>& inputs) {
   const AxisConfig axis = wired(configured, simulated.wiring);
   sim::RigAxisSpec spec;
   spec.name = axis.name;
@@ -121,6 +137,9 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
   const SwitchPlaces places = switchPlaces(axis, simulated);
   spec.min_switch = switchOf(axis.endstop_min, simulated, places.min);
   spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);
+  spec.block_min = simulated.block_min;
+  spec.block_max = simulated.block_max;
+  reportBlock(axis, inputs, spec);
   return spec;
 }
 
@@ -132,14 +151,15 @@ const SimulatedAxis& simulatedOf(const SimulationConfig& config, const AxisConfi
 }
 
 std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
-                                    const SimulationConfig& config) {
+                                    const SimulationConfig& config,
+                                    const std::vector<config::InputConfig>& inputs) {
   std::vector<sim::RigAxisSpec> rig;
   rig.reserve(axes.size());
   for (std::size_t number = 0; number < axes.size(); ++number) {
     const AxisConfig& axis = axes[number];
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const SimulatedAxis& simulated = simulatedOf(config, axis).ofMotor(axis.motorAt(i).motor);
-      rig.push_back(rigAxisOf(motorAlone(axis, i), simulated));
+      rig.push_back(rigAxisOf(motorAlone(axis, i), simulated, inputs));
       rig.back().limits = motorLimits(axes, number);
       rig.back().motor = motorOf(axes, number, simulated.motor);
     }
@@ -274,7 +294,7 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
       emergency_stop_(std::move(emergency_stop)),
       inputs_(inputs),
       clock_(config.speed),
-      rig_(rigOf(axes, config), traceOf(config), couplingsOf(axes), relayOf(motor_power),
+      rig_(rigOf(axes, config, inputs), traceOf(config), couplingsOf(axes), relayOf(motor_power),
            ioOf(outputs, inputs, config)),
       backend_(rig_, [this] { return timeOfEdge(); }) {
   for (const AxisConfig& axis : axes) {

@@ -42,6 +42,8 @@ class SimulatedAxisReader {
         length("switch_hysteresis", Range::notNegative()).value_or(axis.switch_hysteresis);
     if (const auto place = length("min_switch", Range{})) axis.min_switch = place;
     if (const auto place = length("max_switch", Range{})) axis.max_switch = place;
+    if (const auto place = length("block_min", Range{})) axis.block_min = place;
+    if (const auto place = length("block_max", Range{})) axis.block_max = place;
     axis.bounces = reader_.integer("bounces", 0, kMostBounces, axis.bounces);
     axis.bounce_ms =
         reader_.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, axis.bounce_ms);

@@ -272,9 +272,12 @@ class Rig::Impl {
     wire(axis, axis.switchAt(Side::kMax), "endstop_max");
     wire(axis, axis.faultContact(), "fault");
     wire(axis, axis.inPositionContact(), "in_position");
+    std::size_t number = 0;
+    for (SwitchModel& flag : axis.flags()) wire(axis, &flag, fmt::format("flag{}", ++number));
+    wire(axis, axis.stallContact(), "stall");
   }
 
-  void wire(RigAxis& axis, SwitchModel* contact, const char* variable) {
+  void wire(RigAxis& axis, SwitchModel* contact, const std::string& variable) {
     if (contact == nullptr || contact->spec().line.empty()) return;
     Line& line = lineOf(contact->spec().line);
     line.contacts.push_back(contact);
@@ -334,6 +337,15 @@ void Rig::pressInput(const std::string& name, bool pressed, std::int64_t time_ns
   if (input == impl_->inputs.end()) throw Error("the rig has no input named " + name);
   const std::int64_t now_ns = impl_->advance(time_ns);
   input->second.follow(pressed ? kPressed : kReleased, now_ns);
+  impl_->switchesMoved(now_ns);
+}
+
+void Rig::stickInput(const std::string& line, std::optional<bool> active, std::int64_t time_ns) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const auto named = impl_->inputs.find(line);
+  const std::int64_t now_ns = impl_->advance(time_ns);
+  const std::string& wire = named != impl_->inputs.end() ? named->second.spec().line : line;
+  for (SwitchModel* contact : impl_->lineOf(wire).contacts) contact->stick(active);
   impl_->switchesMoved(now_ns);
 }
 

@@ -59,7 +59,9 @@ RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
       fault_(madeContact(spec_.fault_line, spec_.chip.fault_active.value_or(false), false)),
       in_position_(
           madeContact(spec_.in_position_line, spec_.chip.in_position_active.value_or(false), true)),
+      stall_(madeContact(spec_.stall_line, spec_.stall_active, false)),
       slides_(slides) {
+  for (const SwitchSpec& flag : spec_.flags) flags_.emplace_back(flag, Side::kMax, spec_.start);
   if (spec_.limits) judge_.emplace(*spec_.limits);
   if (spec_.brake) brake_.emplace(*spec_.brake);
   if (spec_.motor) swing_.emplace(*spec_.motor);
@@ -189,6 +191,7 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   turnRotor(time_ns);
   rotor_ += static_cast<double>(pulse.moved);
   stepped_ += pulse.moved;
+  if (drives_.empty()) meetBlock(pulse.moved);
   if (swing_) swing_->moveField(angleOf(static_cast<double>(pulse.moved)));
   for (const Drive& drive : drives_) drive.axis->noteMoved(time_ns);
   ++motor_steps_;
@@ -196,6 +199,16 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   // and the lost steps stay lost when the current is switched.
   if (faults_.lose_every > 0 && motor_steps_ % faults_.lose_every == 0) slipped_ += pulse.moved;
   if (faults_.chip_fault_after == motor_steps_) breakChip(time_ns);
+}
+
+// The loss is in the coupling, as in takePulse().
+void RigAxis::meetBlock(std::int64_t moved) {
+  const double place = carriage();
+  const double rounding = 1e-3 * spec_.full_step_travel / chip_.finest();
+  const bool blocked = moved > 0 ? spec_.block_max && place > *spec_.block_max + rounding
+                                 : spec_.block_min && place < *spec_.block_min - rounding;
+  if (blocked) slipped_ += moved;
+  if (stall_) stall_->stick(blocked ? std::optional<bool>(true) : std::nullopt);
 }
 
 // After a pulse the motor takes its time to come to rest.
@@ -275,6 +288,7 @@ void RigAxis::pullMass(std::int64_t time_ns) {
 void RigAxis::moveOwnSwitches(std::int64_t time_ns) {
   if (min_switch_) min_switch_->follow(carriage(), time_ns);
   if (max_switch_) max_switch_->follow(carriage(), time_ns);
+  for (SwitchModel& flag : flags_) flag.follow(carriage(), time_ns);
 }
 
 double RigAxis::steppedWay() const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -52,6 +53,10 @@ class RigAxis {
   SwitchModel* faultContact() { return fault_ ? &*fault_ : nullptr; }
   /// The contact of the in-position output; nullptr if that isn't wired.
   SwitchModel* inPositionContact() { return in_position_ ? &*in_position_ : nullptr; }
+  /// The contacts of its flags.
+  std::deque<SwitchModel>& flags() { return flags_; }
+  /// The contact of the output that reports a block; nullptr if that isn't wired.
+  SwitchModel* stallContact() { return stall_ ? &*stall_ : nullptr; }
   void setFaults(const RigFaults& faults, std::int64_t time_ns);
   void placeCarriage(double position, std::int64_t time_ns);
   /// @name Its chip's serial interface; it must have one
@@ -113,6 +118,8 @@ class RigAxis {
   void fall(std::int64_t time_ns);
   void moveSwitches(std::int64_t time_ns);
   void pullMass(std::int64_t time_ns);
+  /// A step has turned the rotor. Against a block the carriage stays.
+  void meetBlock(std::int64_t moved);
 
   const RigAxisSpec spec_;
   ChipModel chip_;
@@ -135,6 +142,8 @@ class RigAxis {
   std::optional<SwitchModel> min_switch_, max_switch_;
   std::optional<SwitchModel> fault_;
   std::optional<SwitchModel> in_position_;
+  std::deque<SwitchModel> flags_;
+  std::optional<SwitchModel> stall_;
   std::optional<BrakeModel> brake_;
   std::optional<SpringMass> mass_;
   std::vector<Drive> drives_;  // empty: its own motor alone

@@ -1,6 +1,7 @@
 #include "switch_model.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace stepdriver::sim {
 namespace {
@@ -40,8 +41,14 @@ std::int64_t SwitchModel::nextBounce(std::int64_t time_ns) const {
 }
 
 bool SwitchModel::isPressedAt(double carriage) const {
-  const double beyond = outward_ * (carriage - spec_.position);
-  return pressed_ ? beyond >= -spec_.hysteresis - kRounding : beyond >= -kRounding;
+  double outside = outward_ * (spec_.position - carriage);
+  if (std::isfinite(spec_.end)) {
+    const double middle = (spec_.position + spec_.end) / 2.0;
+    double at = carriage - middle;
+    if (spec_.every > 0.0) at -= spec_.every * std::round(at / spec_.every);
+    outside = std::abs(at) - (spec_.end - spec_.position) / 2.0;
+  }
+  return outside <= (pressed_ ? spec_.hysteresis : 0.0) + kRounding;
 }
 
 }  // namespace stepdriver::sim

@@ -1,3 +1,5 @@
+#include "config/read_homing.h"
+
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -111,8 +113,9 @@ TEST(ReadHoming, ChecksEachValue) {
                 {"homing/order", 1.5,
                  "is 1.5 (a number with a decimal point), but must be an integer from 0 to 1000"},
                 {"homing/speed", 5,
-                 "is not known; known here: debounce_ms, latch_speed_mm_s, max_travel_mm, "
-                 "offset_mm, order, pull_off_mm, seek_speed_mm_s, switch and timeout_s"},
+                 "is not known; known here: debounce_ms, final_position_mm, kind, "
+                 "latch_speed_mm_s, max_travel_mm, offset_mm, order, pull_off_mm, "
+                 "seek_speed_mm_s, switch and timeout_s"},
                 {"homing", 5, "is 5 (an integer), but must be a map"},
                 {"require_homing", 1, "is 1 (an integer), but must be true or false"}});
 }
@@ -185,6 +188,87 @@ TEST(ReadHoming, NamesWhatIsMissing) {
   put(axis, "require_homing", true);
   EXPECT_EQ(issuesOfX(axis),
             lineOfX("require_homing", "is true, but must be false if there is no homing"));
+}
+
+// ---- kinds ----
+
+ConfigValue blockAxis() {
+  ConfigValue axis = linearAxis();
+  put(axis, "min_position_mm", 0.0);
+  put(axis, "max_position_mm", 200.0);
+  put(axis, "homing/kind", "block");
+  put(axis, "homing/towards", "min");
+  put(axis, "homing/input", "stall");
+  put(axis, "homing/seek_speed_mm_s", 50.0);
+  put(axis, "homing/pull_off_mm", 4.0);
+  put(axis, "homing/max_travel_mm", 250.0);
+  return axis;
+}
+
+TEST(ReadHoming, ReadsAHomingToABlock) {
+  ConfigValue axis = blockAxis();
+  EXPECT_EQ(readX(axis).homing->kind, HomingKind::kBlock);
+  EXPECT_EQ(readX(axis).homing->input, "stall");
+  EXPECT_EQ(readX(axis).homing->approaches, 1);
+  EXPECT_FALSE(readX(axis).homing->at_max);
+  // The second approach has a speed of its own, which may be higher than that of a latch.
+  put(axis, "homing/approaches", 2);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/latch_speed_mm_s", "is missing; it must be a number above 0"));
+  put(axis, "homing/latch_speed_mm_s", 40.0);
+  EXPECT_DOUBLE_EQ(readX(axis).homing->latch_speed, 0.04);
+  put(axis, "homing/pull_off_mm", 0.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/pull_off_mm",
+                    "is 0.0, but must be above 0, from where the second approach begins"));
+}
+
+TEST(ReadHoming, ABlockNeedsSomethingThatReportsIt) {
+  ConfigValue axis = blockAxis();
+  drop(axis, "homing/input");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/input",
+                    "is missing, but something must tell that the motor is blocked: a name of "
+                    "`inputs`, or pins/fault of each motor"));
+}
+
+TEST(ReadHoming, ABlockHasNoSwitchAndNoDebounce) {
+  ConfigValue axis = blockAxis();
+  put(axis, "homing/debounce_ms", 5.0);
+  const Lines issues = issuesOfX(axis);
+  ASSERT_EQ(issues.size(), 1U);
+  EXPECT_NE(issues[0].find("homing/debounce_ms: is not known"), std::string::npos) << issues[0];
+}
+
+TEST(ReadHoming, ReadsAFinalPositionInPlaceOfThePullOff) {
+  ConfigValue axis = homingAxis();
+  drop(axis, "homing/pull_off_mm");
+  put(axis, "homing/final_position_mm", 100.0);
+  EXPECT_DOUBLE_EQ(*readX(axis).homing->final_position, 0.1);
+  EXPECT_DOUBLE_EQ(restOf(*readX(axis).homing), 0.1);
+  put(axis, "homing/final_position_mm", 201.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/final_position_mm",
+                    "is 201.0, but must be at most max_position_mm, which is 200.0"));
+  put(axis, "min_position_mm", -10.0);
+  put(axis, "homing/final_position_mm", -4.0);
+  EXPECT_EQ(issuesOfX(axis), lineOfX("homing/final_position_mm",
+                                     "is -4.0, but must be at least offset_mm, which is -3"));
+}
+
+TEST(ReadHoming, ADirectHomingIsANumber) {
+  ConfigValue axis = linearAxis();
+  put(axis, "homing/kind", "direct");
+  put(axis, "homing/offset_mm", 12.0);
+  EXPECT_EQ(readX(axis).homing->kind, HomingKind::kDirect);
+  EXPECT_DOUBLE_EQ(readX(axis).homing->offset, 0.012);
+  put(axis, "max_position_mm", 10.0);
+  EXPECT_EQ(
+      issuesOfX(axis),
+      lineOfX("homing/offset_mm", "is 12.0, but must be at most max_position_mm, which is 10.0"));
+  drop(axis, "max_position_mm");
+  drop(axis, "homing/offset_mm");
+  EXPECT_EQ(issuesOfX(axis), lineOfX("homing/offset_mm", "is missing; it must be a number"));
 }
 
 }  // namespace

@@ -124,7 +124,8 @@ TEST(ShellCore, SaysWhyAMotionHasEndedIfItsAxisHasNoFaultAnyMore) {
   for (const auto end :
        {pulse::EndReason::kEmergencyStop, pulse::EndReason::kChipFault, pulse::EndReason::kTooLate,
         pulse::EndReason::kLineError, pulse::EndReason::kNotInPosition, pulse::EndReason::kSkewed,
-        pulse::EndReason::kCompanion, pulse::EndReason::kEndstopMin, pulse::EndReason::kDone}) {
+        pulse::EndReason::kBlocked, pulse::EndReason::kCompanion, pulse::EndReason::kEndstopMin,
+        pulse::EndReason::kDone}) {
     ByHand machine;
     const activity::Reply reply = machine.answerOf(MoveTo{0, 0.01, false, 0.0});
     const axis::Move move = std::get<std::vector<axis::Move>>(reply.value).front();

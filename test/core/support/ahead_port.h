@@ -68,10 +68,11 @@ class AheadPort final : public pulse::StepPort {
     lanes_[step.channel].last = step.time;
     lanes_[step.channel].takes = step.time;
   }
-  void begin(std::size_t channel, const Squaring& squaring) override {
+  void begin(std::size_t channel, const Manner& manner) override {
     const std::lock_guard<std::mutex> lock(mutex_);
-    tracks_[channel].state.still = squaring.still;
-    tracks_[channel].guard.begin(squaring.squares, squaring.is_square);
+    tracks_[channel].state.still = manner.still;
+    tracks_[channel].guard.begin({manner.squares, manner.is_square, manner.until_block},
+                                 clock_.now());
   }
   void takeBack(std::size_t channel) override {
     const std::lock_guard<std::mutex> lock(mutex_);

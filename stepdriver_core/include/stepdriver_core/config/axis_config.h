@@ -98,17 +98,32 @@ struct BrakeConfig {
 /// How the motor's current is switched off at rest.
 enum class IdleAction { kDisable, kSleep };
 
-/// How an axis finds its zero: at the position where one of its endstop switches closes. A unit is
-/// m on a linear axis, rad on a rotary one.
+/// What tells an axis where it is when it is homed.
+enum class HomingKind {
+  kLimit,   ///< the place where one of its endstop switches closes
+  kBlock,   ///< the place where its motor is blocked
+  kDirect,  ///< nothing: it is where it stands
+};
+
+/// How an axis finds its zero: at its trigger point. A unit is m on a linear axis, rad on a rotary
+/// one.
 struct HomingConfig {
-  bool at_max = false;       ///< true: the switch is the max endstop; false: the min endstop
-  double seek_speed = 0.0;   ///< [unit/s] the speed of the first approach to the switch
+  HomingKind kind = HomingKind::kLimit;
+  /// The switch is the max endstop, or of other kinds, the axis moves towards max; false: min.
+  bool at_max = false;
+  /// The input with a name that is active, if only for an instant, when the motor is blocked; only
+  /// for kBlock. Empty: the fault outputs of its drivers are.
+  std::string input;
+  int approaches = 1;        ///< of a kBlock: 2 for a second one at latch_speed
+  double seek_speed = 0.0;   ///< [unit/s] the speed of the first approach to the trigger point
   double latch_speed = 0.0;  ///< [unit/s] off the switch, and back to the trigger point
   double pull_off = 0.0;     ///< [unit] from the trigger point to the final position
-  double offset = 0.0;       ///< [unit] position of the trigger point
-  double max_travel = 0.0;   ///< [unit] longest stroke to reach or leave the switch
-  double timeout = 60.0;     ///< [s] for the whole homing
-  double debounce = 0.005;   ///< [s] a level of the switch must last so long to count
+  /// [unit] Where the axis stands at the end; empty: pull_off away from the trigger point.
+  std::optional<double> final_position;
+  double offset = 0.0;      ///< [unit] position of the trigger point
+  double max_travel = 0.0;  ///< [unit] longest stroke to reach or leave the switch
+  double timeout = 60.0;    ///< [s] for the whole homing
+  double debounce = 0.005;  ///< [s] a level of the endstop must last so long to count
   int order = 0;  ///< axes with the lowest number go first; the same number: simultaneously
 };
 

@@ -42,6 +42,9 @@ struct SimulatedAxis {
   /// [mm|deg] Position of the switch; empty: outside the soft limit.
   std::optional<double> min_switch;
   std::optional<double> max_switch;
+  /// [mm|deg] Where a block stops the carriage; empty: nowhere.
+  std::optional<double> block_min;
+  std::optional<double> block_max;
   double settling_ms = 10.0;  ///< [ms] from the last pulse until the driver is in position
   double load_falls = 0.0;  ///< [mm/s|deg/s] how fast a load falls that nothing holds, towards min
   /// [Hz] frequency of a mass that the carriage pulls by a spring; 0: none.

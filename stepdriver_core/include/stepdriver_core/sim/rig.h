@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -24,15 +25,18 @@ struct Wire {
   bool inverted = false;  ///< the chip sees the opposite level, as with common-anode wiring
 };
 
-/// An endstop switch that the carriage presses.
+/// A switch that the carriage presses: an endstop, or a flag that it passes on both sides.
 ///
 /// After each change its line takes the new level at once, and then makes `bounces` on-off pairs of
 /// edges, bounce_ns apart, ending at the new level.
 struct SwitchSpec {
   std::string line;
-  bool active_level = false;   ///< level of the line while the switch is pressed
-  double position = 0.0;       ///< [mm|deg] pressed from here on outwards
-  double hysteresis = 0.0;     ///< [mm|deg] released again this far inside of position
+  bool active_level = false;  ///< level of the line while the switch is pressed
+  double position = 0.0;      ///< [mm|deg] pressed from here on outwards
+  /// [mm|deg] Of a flag, pressed from position to here; infinite: an endstop.
+  double end = std::numeric_limits<double>::infinity();
+  double every = 0.0;  ///< [mm|deg] of a flag, there is one so often; above its length; 0: once
+  double hysteresis = 0.0;     ///< [mm|deg] released again this far outside of that
   int bounces = 0;             ///< extra on-off pairs after each change
   std::int64_t bounce_ns = 0;  ///< time from one bounce edge to the next
 };
@@ -137,6 +141,15 @@ struct RigAxisSpec {
   double full_step_travel = 0.0;  ///< [mm|deg] travel of the carriage per full step; above 0
   double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
   std::optional<SwitchSpec> min_switch, max_switch;
+  /// Flags that its carriage passes. Several may have one line.
+  std::vector<SwitchSpec> flags;
+  /// [mm|deg] Where a block stops the carriage, whatever the motor does; empty: nowhere. Only of an
+  /// axis with motors of its own.
+  std::optional<double> block_min, block_max;
+  /// An output that is active from a step that a block stopped until one that moves the carriage;
+  /// empty: not wired.
+  std::string stall_line;
+  bool stall_active = true;
   /// The driver's in-position output; empty: not wired. It is active while current flows, from
   /// settling_ns after the last pulse on.
   std::string in_position_line;
@@ -331,6 +344,10 @@ class Rig : public gpio::Board {
   ///
   /// @throw Error if there is no such input.
   void pressInput(const std::string& name, bool pressed, std::int64_t time_ns);
+
+  /// The contacts of a line, or of an input with that name, read active (true) or inactive from now
+  /// on; empty: they work again.
+  void stickInput(const std::string& line, std::optional<bool> active, std::int64_t time_ns);
 
   /// The level of an output; empty if it was never requested.
   std::optional<bool> outputLevel(const std::string& line) const;

@@ -38,8 +38,7 @@ void Home::serve(RequestContext& machine, const SharedCall& call) const {
     accepted.ids.push_back(number);
     accepted.outcomes.push_back(outcome);
     machine.activities.begin(
-        std::make_unique<activity::Homing>(machine.context, machine.axis(id), number, outcome),
-        kTakenOver);
+        activity::Homing::make(machine.context, machine.axis(id), number, outcome), kTakenOver);
   }
   call->succeed(std::move(accepted));
 }
