@@ -12,8 +12,8 @@
 #include "axis/axis_model.h"
 #include "bus/register_job.h"
 #include "call.h"
+#include "motion_outputs.h"
 #include "motor_power.h"
-#include "path_outputs.h"
 #include "pulse/command.h"
 #include "stepdriver_core/pulse/clock.h"
 
@@ -59,7 +59,7 @@ class Context : public AnswerSink {
   axis::LineNames lines;
   std::vector<std::unique_ptr<axis::AxisModel>> axes;
   MotorPower motor_power;
-  PathOutputs path_outputs;
+  MotionOutputs motion_outputs;
 
   /// @name What belongs to this turn
   /// @{

@@ -10,7 +10,7 @@
 
 #include "axis/axis_model.h"
 #include "call.h"
-#include "path_outputs.h"
+#include "motion_outputs.h"
 #include "point_to_point/motion_limits.h"
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/pulse/clock.h"

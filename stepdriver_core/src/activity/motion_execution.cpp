@@ -242,7 +242,7 @@ MotionExecution::Plans MotionExecution::plan(pulse::Nanoseconds lead) {
 std::vector<axis::Move> MotionExecution::prepare() {
   prepared_ = plan(lead_);
   if (course_.path && course_.path->marks()) {
-    context_.path_outputs.refuseUnlessFree(*course_.path->marks(), group_, axesAlong());
+    context_.motion_outputs.refuseUnlessFree(*course_.path->marks(), group_, axesAlong());
   }
   std::vector<axis::Move> moves;
   for (std::size_t i = 0; i < orders_.size(); ++i) {
@@ -274,7 +274,7 @@ void MotionExecution::takeOutputs(const motion::SharedPath& path) {
     marks_ = std::make_shared<MarksOfPath>();
     marks_->group = group_;
   }
-  context_.path_outputs.take(*wanted, marks_, axesAlong());
+  context_.motion_outputs.take(*wanted, marks_, axesAlong());
   for (Order& order : orders_) order.goal.marks = marks_;
 }
 
@@ -283,7 +283,7 @@ void MotionExecution::takeOutputs(const motion::SharedPath& path) {
 bool MotionExecution::mustWaitForOutputs(Plans& plans) const {
   if (started_ || slowsDown() || !course_.path->marks()) return false;
   const std::int64_t earliest =
-      context_.path_outputs.mayBegin(*course_.path->marks()) - context_.slipped;
+      context_.motion_outputs.mayBegin(*course_.path->marks()) - context_.slipped;
   if (earliest <= plans.at) return false;
   plans.at = earliest;
   return true;
@@ -296,7 +296,7 @@ void MotionExecution::orderMarks(const Plans& plans,
   if (!along) return;
   std::int64_t delay = 0;
   for (const Order& order : orders_) delay = std::max(delay, order.axis->motor.shapingDelay());
-  context_.path_outputs.order(group_, plans.path, along, delay, context_.marksOf(follows));
+  context_.motion_outputs.order(group_, plans.path, along, delay, context_.marksOf(follows));
 }
 
 // ---- orders to the engine ----
@@ -394,7 +394,7 @@ void MotionExecution::stop(const EarlyEnd& why, const SharedCall& call) {
     return;
   }
   why_ = why;
-  if (marks_) context_.path_outputs.stop(context_, group_);
+  if (marks_) context_.motion_outputs.stop(context_, group_);
   if (anyMoves()) return change(Mode::kStop, call);
   if (isParked()) drop();  // otherwise it has come to rest by itself
 }
@@ -560,7 +560,7 @@ bool MotionExecution::poll() {
   }
   if (!over_ && open_.empty() && extension_) tryExtension();
   const bool rests = !over_ && open_.empty() && !anyMoves() && !isParked();
-  if (rests && !(marks_ && context_.path_outputs.isDue(group_))) rested();
+  if (rests && !(marks_ && context_.motion_outputs.isDue(group_))) rested();
   return over_;
 }
 
@@ -722,7 +722,7 @@ void MotionExecution::finish() {
   concludePredecessors();
   if (marks_) {
     const bool reached = why_.text.empty() && result_.end == axis::MoveEnd::kReached;
-    context_.path_outputs.leave(context_, group_, reached);
+    context_.motion_outputs.leave(context_, group_, reached);
   }
   over_ = true;
   held_ = false;
@@ -734,7 +734,7 @@ void MotionExecution::finish() {
 }
 
 std::vector<Predecessor> MotionExecution::handOver() {
-  if (marks_) context_.path_outputs.leave(context_, group_, false);
+  if (marks_) context_.motion_outputs.leave(context_, group_, false);
   std::vector<Predecessor> left = std::exchange(predecessors_, {});
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const Order& order = orders_[i];

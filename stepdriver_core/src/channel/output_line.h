@@ -29,7 +29,14 @@ struct OutputLineState {
   bool on = false;               ///< by the last of them
   bool due = false;              ///< a mark is still to come in the motion as it is ordered
   bool too_long = false;         ///< the last of them was by OutputLine::max_on
-  int error = 0;                 ///< errno of a write that has failed, which ended the path's part
+  /// @name What the position of an axis switches
+  /// @{
+  std::uint64_t compare = 0;   ///< serial of the order for it that is kept; 0: none
+  bool muted = false;          ///< an emergency stop or a failure has come since: it only counts
+  std::uint64_t compared = 0;  ///< actions that were made since the start
+  std::uint64_t missed = 0;    ///< those whose place was passed, but which could not be made
+  /// @}
+  int error = 0;  ///< errno of a write that has failed, which ended the path's part
 };
 
 }  // namespace stepdriver::pulse

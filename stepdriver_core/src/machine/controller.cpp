@@ -49,7 +49,7 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
   context_.out = &last_;
   context_.lines = std::move(names);
   context_.motor_power = std::move(motor_power);
-  context_.path_outputs = activity::PathOutputs(requests_.named.outputs.configs());
+  context_.motion_outputs = activity::MotionOutputs(requests_.named.outputs.configs());
   context_.mode.powered = context_.motor_power.isThere();
   for (std::size_t i = 0; i < axes.size(); ++i) {
     context_.axes.push_back(std::make_unique<axis::AxisModel>(
@@ -76,10 +76,13 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   context_.stops_asked = input.stops_asked;
   context_.beginTurn(out);
   std::visit([this](const auto& what) { on(what); }, input.what);
+  // Before motions that begin in this turn.
+  superviseCompares();
   activities_.poll();
   supervise();
   while (supervisePower() || superviseOutputs()) {
   }
+  superviseCompares();
   requests_.named.inputs.poll(context_);
   showIo();
   if (!requests_.named.outputs.areBeingWritten()) stops_concluded_ = context_.stops_handled;
@@ -118,7 +121,7 @@ void Controller::on(const EngineNews& news) {
   handleStops(news);
   for (std::size_t i = 0; i < news.channels.size(); ++i)
     update(*context_.axes.at(i), news.channels[i]);
-  context_.path_outputs.update(news.outputs);
+  context_.motion_outputs.update(news.outputs);
 }
 
 void Controller::handleStops(const EngineNews& news) {
@@ -285,6 +288,16 @@ bool Controller::superviseOutputs() {
   activities_.poll();
   supervise();
   return true;
+}
+
+// While an axis is homed, its count means no place.
+void Controller::superviseCompares() {
+  if (requests_.named.outputs.empty()) return;
+  context_.motion_outputs.supervise(
+      context_, requests_.whySafe(), [this](const axis::AxisModel& axis) {
+        const Activity* const owner = activities_.owner(axis);
+        return owner == nullptr || owner->homingPhase() == axis::HomingPhase::kNone;
+      });
 }
 
 void Controller::showIo() {

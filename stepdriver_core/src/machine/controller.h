@@ -65,6 +65,7 @@ class Controller {
   bool supervisePower();
   bool motorsMayLosePower() const;
   bool superviseOutputs();
+  void superviseCompares();
   void showIo();
   void superviseIdle(axis::AxisModel& axis);
   void superviseChips(axis::AxisModel& axis);

@@ -699,6 +699,15 @@ void Machine::enable(bool on) {
   ask(*impl_->shell_, std::move(wanted));
 }
 
+void Machine::setPositionCompare(const std::string& output,
+                                 const config::PositionCompare& compare) {
+  ask(*impl_->shell_, SetPositionCompare{output, compare});
+}
+
+void Machine::clearPositionCompare(const std::string& output) {
+  ask(*impl_->shell_, SetPositionCompare{output, {}});
+}
+
 void Machine::setOutput(const std::string& name, bool on) {
   ask(*impl_->shell_, SetOutput{name, on});
 }

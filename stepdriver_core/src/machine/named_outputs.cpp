@@ -54,8 +54,9 @@ std::string NamedOutput::poll(activity::Context& context, const std::string& why
   const bool was_safe = wanted_ == config_.at_fault;
   std::string failure = adopt(context);
   if (const std::string own = endWrite(context); failure.empty()) failure = own;
-  activity::PathOutputs& paths = context.path_outputs;
+  activity::MotionOutputs& paths = context.motion_outputs;
   is_taken_ = paths.isTaken(number_);
+  state_.axis = paths.comparedAxis(number_);
   if (must_be_safe) {
     paths.end(context, number_);
     paths.takeWanted(number_);
@@ -66,7 +67,7 @@ std::string NamedOutput::poll(activity::Context& context, const std::string& why
     }
     wanted_ = config_.at_fault;
   } else if (is_taken_) {
-    paths.note(number_, lineForPaths(why_safe));
+    paths.note(number_, lineForMotions(why_safe));
     return failure;
   } else if (const std::optional<bool> left = paths.takeWanted(number_)) {
     set(*left, {});
@@ -82,13 +83,15 @@ std::string NamedOutput::poll(activity::Context& context, const std::string& why
   } else if (must_be_safe || context.now >= mayChange()) {
     write(context, must_be_safe);
   }
-  paths.note(number_, lineForPaths(why_safe));
+  paths.note(number_, lineForMotions(why_safe));
   return failure;
 }
 
 // What a path has made of the line since the last look.
 std::string NamedOutput::adopt(activity::Context& context) {
-  const pulse::OutputLineState& by_path = context.path_outputs.state(number_);
+  const pulse::OutputLineState& by_path = context.motion_outputs.state(number_);
+  state_.compared = by_path.compared;
+  state_.missed = by_path.missed;
   if (by_path.changes != std::exchange(changes_seen_, by_path.changes)) {
     // If it was written here at that time, nobody knows which write came last.
     if (job_) job_->doubtful = true;
@@ -104,8 +107,8 @@ std::string NamedOutput::adopt(activity::Context& context) {
   return failed(by_path.error, context);
 }
 
-activity::PathOutputs::Line NamedOutput::lineForPaths(const std::string& why_safe) const {
-  activity::PathOutputs::Line line;
+activity::MotionOutputs::Line NamedOutput::lineForMotions(const std::string& why_safe) const {
+  activity::MotionOutputs::Line line;
   if (!why_safe.empty()) {
     line.why_not = why_safe;
   } else if (!state_.error.empty()) {
@@ -199,14 +202,18 @@ void NamedOutputs::begin(const SharedCall& call) {
 
 void NamedOutputs::set(const activity::Context& context, const std::string& name, bool on,
                        const SharedCall& call) {
+  const std::size_t number = numberOf(name);
+  const bool is_free = !context.motion_outputs.isTaken(number) &&
+                       context.motion_outputs.comparedAxis(number).empty();
+  if (is_free) return outputs_[number].set(on, call);
+  throw Refused(
+      fmt::format("the output {}: {} switches it", name, context.motion_outputs.holder(number)));
+}
+
+std::size_t NamedOutputs::numberOf(const std::string& name) const {
   const auto found = std::find_if(outputs_.begin(), outputs_.end(),
                                   [&](const NamedOutput& output) { return output.name() == name; });
-  if (found != outputs_.end()) {
-    const auto number = static_cast<std::size_t>(found - outputs_.begin());
-    if (!context.path_outputs.isTaken(number)) return found->set(on, call);
-    throw Refused(
-        fmt::format("the output {}: {} switches it", name, context.path_outputs.holder(number)));
-  }
+  if (found != outputs_.end()) return static_cast<std::size_t>(found - outputs_.begin());
   if (outputs_.empty()) {
     throw Refused(fmt::format("there is no output {}: none is configured", printable(name)));
   }
@@ -218,7 +225,7 @@ void NamedOutputs::set(const activity::Context& context, const std::string& name
 void NamedOutputs::stop(const activity::Context& context) {
   for (std::size_t i = 0; i < outputs_.size(); ++i) {
     const std::optional<bool>& at_stop = outputs_[i].config().at_stop;
-    if (at_stop && !context.path_outputs.isTaken(i)) outputs_[i].set(*at_stop, {});
+    if (at_stop && !context.motion_outputs.isTaken(i)) outputs_[i].set(*at_stop, {});
   }
 }
 

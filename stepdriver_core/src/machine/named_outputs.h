@@ -57,7 +57,7 @@ class NamedOutput {
   std::string endWrite(activity::Context& context);
   std::string adopt(activity::Context& context);
   std::string failed(int error, activity::Context& context);
-  activity::PathOutputs::Line lineForPaths(const std::string& why_safe) const;
+  activity::MotionOutputs::Line lineForMotions(const std::string& why_safe) const;
   void write(activity::Context& context, bool safe);
   void refuseCalls(const std::string& why);
   bool mustGoOff(pulse::Nanoseconds now) const;
@@ -90,6 +90,9 @@ class NamedOutputs {
   /// @param lines of each, by its index in the request.
   NamedOutputs(const std::vector<config::OutputConfig>& outputs, const std::vector<int>& lines);
 
+  /// @throw Refused if there is no such output, naming those that there are.
+  std::size_t numberOf(const std::string& name) const;
+  const config::OutputConfig& config(std::size_t number) const { return outputs_[number].config(); }
   /// Switches each as it begins. @param call is answered when that is done.
   void begin(const activity::SharedCall& call);
   /// @throw Refused if there is no such output, naming those that there are, or if a path has it.

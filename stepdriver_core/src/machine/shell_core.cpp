@@ -170,7 +170,8 @@ void ShellCore::postCommands() {
     for (std::size_t i = 0; i < command.marks_count; ++i) {
       posted_marks_[command.marks[i].output] = command.marks[i].serial;
     }
-    if (command.kind == pulse::Command::Kind::kEndMarks) {
+    if (command.kind == pulse::Command::Kind::kEndMarks ||
+        command.kind == pulse::Command::Kind::kCompare) {
       posted_marks_[command.output] = command.serial;
     } else if (command.kind != pulse::Command::Kind::kFollow) {
       posted_[static_cast<std::size_t>(command.channel)] = command.serial;

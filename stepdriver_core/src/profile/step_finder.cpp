@@ -105,6 +105,21 @@ bool StepFinder::next(Step& step) {
   return give(step, s.anchor_ns.whole + nearest(s.anchor_ns.rest + ns));
 }
 
+bool StepFinder::nextTo(std::int64_t low, std::int64_t high, Step& step) {
+  for (;;) {
+    Stretch& s = stretch_;
+    const std::int64_t left = (s.way_end - s.way) * s.way_step;
+    const std::int64_t wanted = s.direction > 0 ? high - count() : count() - low;
+    if (wanted <= left) {
+      s.way += (wanted - 1) * s.way_step;
+      s.known = 0;  // the cubic needs the four steps right before this one
+      return next(step);
+    }
+    s.way = s.way_end;
+    if (!enterNext()) return false;
+  }
+}
+
 bool StepFinder::nextOfNewStretch(Step& step) {
   while (stretch_.way == stretch_.way_end) {
     if (!enterNext()) return false;

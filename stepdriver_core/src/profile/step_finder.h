@@ -47,8 +47,12 @@ class StepFinder {
 
   /// @return false if no step is left; `step` is then unchanged.
   bool next(Step& step);
+  /// Goes on to the step with which the count becomes one of these two, whichever comes first. The
+  /// steps before it are left out: a stretch takes the same time however many it has.
+  /// @pre low < count() < high, each of them less than 2^61 from 0
+  bool nextTo(std::int64_t low, std::int64_t high, Step& step);
 
-  /// The position of the axis after the steps that next() has returned.
+  /// The position of the axis after the steps that were returned or left out.
   std::int64_t count() const { return stretch_.anchor_count + stretch_.away * stretch_.way; }
 
  private:

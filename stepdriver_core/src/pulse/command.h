@@ -9,6 +9,7 @@
 #include "profile/marks.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "timeline/compare_track.h"
 
 namespace stepdriver::pulse {
 
@@ -75,6 +76,22 @@ struct FollowMarks {
   /// @}
 };
 
+/// The position of an axis switches an output from now on. The order does nothing if the axis
+/// moves.
+struct Compare {
+  std::size_t output = 0;    ///< by its number in the configuration
+  std::uint64_t serial = 0;  ///< of the orders for this output, above 0
+  int channel = 0;
+  const CompareTrack* track = nullptr;  ///< lives until the output reads a later order, or none
+  /// @name The state of the output
+  /// @{
+  std::uint64_t changes = 0;  ///< OutputLineState::changes, as far as it is known
+  bool on = false;
+  Nanoseconds changed = 0;   ///< clock time of its last change
+  Nanoseconds on_since = 0;  ///< clock time
+  /// @}
+};
+
 /// An order to the pulse thread. Serials rise by one on each channel.
 struct Command {
   /// What the command orders.
@@ -82,7 +99,8 @@ struct Command {
     kFollow,    ///< follow the profiles: all of them, or none if one can't be accepted
     kReserve,   ///< the chip's other pins are being written: make no step, ignore the fault line
     kRelease,   ///< ends a reservation
-    kEndMarks,  ///< a path no longer switches an output: what is left of its marks is given up
+    kCompare,   ///< the position of an axis switches an output
+    kEndMarks,  ///< motions no longer switch an output: what is left of its marks is given up
   };
 
   Kind kind = Kind::kFollow;
@@ -90,8 +108,9 @@ struct Command {
   std::size_t follow_count = 0;
   const FollowMarks* marks = nullptr;  ///< accepted or refused with the profiles; valid as they are
   std::size_t marks_count = 0;
-  std::size_t output = 0;  ///< for kEndMarks, with the serial
-  int channel = 0;         ///< for kReserve and kRelease, like all below
+  const Compare* compare = nullptr;  ///< for kCompare; valid until the output has handled it
+  std::size_t output = 0;            ///< for kCompare and kEndMarks, with the serial
+  int channel = 0;                   ///< for kReserve and kRelease, like all below
   std::uint64_t serial = 0;
   Nanoseconds ready = 0;  ///< for kRelease: clock time before which no step goes out
   /// The motor's position in the microsteps of a new mode.

@@ -81,6 +81,15 @@ struct EngineChannel {
     return motion->nextIsFast() ? now - lane.last - motion->interval() : 0;
   }
 
+  /// [microsteps] Where the joint is by its steps, or has come to rest.
+  /// @param done its motion has come to its end
+  double joint(bool done) const {
+    if (kin->all.size() == 1) return static_cast<double>(state.count - state.slack);
+    return done ? motion->restsAt() : static_cast<double>(state.count) + state.between;
+  }
+  /// [microsteps] The same at rest.
+  double jointRests() const { return joint(true); }
+
   /// Until the last open step of a motion that has ended is over, only its steps are told.
   void publish() { kin->drains ? published.storeFirst<kStepBytes>(state) : published.store(state); }
   /// @param now clock time.

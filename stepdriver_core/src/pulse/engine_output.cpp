@@ -18,16 +18,21 @@ void EngineOutput::follow(const FollowMarks& order) {
   if (!marks_.follows()) {
     if (!order.begins || state_.ended == order.group) return;
     state_.group = order.group;
-    // Otherwise the order doesn't know the last change yet.
-    if (order.changes == state_.changes) {
-      state_.on = order.on;
-      state_.changed = order.changed;
-      state_.on_since = order.on_since;
-    }
-    state_.too_long = false;
-    state_.error = 0;
+    adopt(order.changes, order.on, order.changed, order.on_since);
   }
   marks_.follow({order.along, order.marks, order.delay, order.serial});
+}
+
+// The state of the output when an order begins, unless that doesn't know the last change yet.
+void EngineOutput::adopt(std::uint64_t changes, bool on, Nanoseconds changed,
+                         Nanoseconds on_since) {
+  if (changes == state_.changes) {
+    state_.on = on;
+    state_.changed = changed;
+    state_.on_since = on_since;
+  }
+  state_.too_long = false;
+  state_.error = 0;
 }
 
 bool EngineOutput::end() {
@@ -49,8 +54,7 @@ void EngineOutput::taken(std::uint64_t serial) {
 Nanoseconds EngineOutput::markDue(Nanoseconds slipped) const {
   if (!marks_.due()) return kNever;
   const Nanoseconds due = *marks_.due() + slipped;
-  if (marks_.on() == state_.on) return due;
-  return std::max(due, state_.changed + (state_.on ? line_.min_on : line_.min_off));
+  return marks_.on() == state_.on ? due : std::max(due, mayChange());
 }
 
 Nanoseconds EngineOutput::tooLongAt() const {
@@ -59,24 +63,15 @@ Nanoseconds EngineOutput::tooLongAt() const {
 
 Nanoseconds EngineOutput::due(Nanoseconds slipped) const {
   const Nanoseconds told = untold_ ? tell_at_ : kNever;
+  if (channel_ >= 0) {
+    return std::min({compareDue(slipped), isWritten() ? tooLongAt() : kNever, told});
+  }
   return marks_.follows() ? std::min({markDue(slipped), tooLongAt(), told}) : told;
 }
 
 bool EngineOutput::serve(Nanoseconds now, Nanoseconds slipped, PinRing* ring) {
   bool worked = false;
-  while (marks_.follows()) {
-    const Nanoseconds mark = markDue(slipped);
-    if (mark <= now) {
-      state_.too_long = false;
-      if (write(marks_.on(), now, ring)) marks_.advance();
-    } else if (tooLongAt() <= now) {
-      state_.too_long = true;
-      write(false, now, ring);
-    } else {
-      break;
-    }
-    worked = true;
-  }
+  while (serveMark(now, slipped, ring) || serveCompare(now, slipped, ring)) worked = true;
   if (worked) publish();
   untold_ = untold_ || worked;
   const bool tell = untold_ && (now >= tell_at_ || (worked && !state_.due));
@@ -86,6 +81,123 @@ bool EngineOutput::serve(Nanoseconds now, Nanoseconds slipped, PinRing* ring) {
   return true;
 }
 
+// @return whether something was due
+bool EngineOutput::serveMark(Nanoseconds now, Nanoseconds slipped, PinRing* ring) {
+  if (!marks_.follows()) return false;
+  if (markDue(slipped) <= now) {
+    state_.too_long = false;
+    if (write(marks_.on(), now, ring)) marks_.advance();
+  } else if (tooLongAt() <= now) {
+    state_.too_long = true;
+    write(false, now, ring);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+// ---- the position of an axis ----
+
+void EngineOutput::compare(const Compare& order, double joint) {
+  endCompare();
+  adopt(order.changes, order.on, order.changed, order.on_since);
+  channel_ = order.channel;
+  state_.compare = order.serial;
+  compare_.begin(*order.track, joint);
+  rests_ = compare_.isOnHere();
+}
+
+void EngineOutput::endCompare() {
+  channel_ = -1;
+  state_.compare = 0;
+  state_.muted = false;
+  reached_ = false;
+  rests_.reset();
+  pulse_ends_ = kNever;
+  compare_.clear();
+}
+
+bool EngineOutput::mute() {
+  if (!isWritten()) return false;
+  state_.muted = true;
+  rests_.reset();
+  pulse_ends_ = kNever;
+  publish();
+  return true;
+}
+
+void EngineOutput::axisEnded(Nanoseconds motion_now, double joint, bool reached) {
+  if (!compare_.follows()) return;
+  compare_.end(motion_now, joint);
+  reached_ = reached && compare_.track()->pulse_at_end;
+}
+
+Nanoseconds EngineOutput::compareDue(Nanoseconds slipped) const {
+  Nanoseconds due = pulse_ends_;
+  if (rests_) due = std::min(due, *rests_ == state_.on ? 0 : mayChange());
+  if (reached_) due = 0;
+  if (!compare_.due()) return due;
+  const Nanoseconds next = *compare_.due() + slipped;
+  const CompareAction action = compare_.action();
+  const bool changes = isWritten() && ((action == CompareAction::kOn && !state_.on) ||
+                                       (action == CompareAction::kOff && state_.on));
+  return std::min(due, changes ? std::max(next, mayChange()) : next);
+}
+
+bool EngineOutput::serveCompare(Nanoseconds now, Nanoseconds slipped, PinRing* ring) {
+  if (channel_ < 0) return false;
+  switch (compare_.takeUndone()) {
+    case CompareAction::kOn:
+      rests_ = true;
+      break;
+    case CompareAction::kOff:
+      rests_ = false;
+      break;
+    default:
+      break;
+  }
+  if (state_.muted) rests_.reset();
+  if (pulse_ends_ <= now) {
+    pulse_ends_ = kNever;
+    write(false, now, ring);
+  } else if (tooLongAt() <= now && isWritten()) {
+    state_.too_long = true;
+    write(false, now, ring);
+  } else if (rests_ && (*rests_ == state_.on || mayChange() <= now)) {
+    write(*std::exchange(rests_, std::nullopt), now, ring);
+  } else if (compareDue(slipped) <= now) {
+    if (std::exchange(reached_, false)) {
+      act(CompareAction::kPulse, now, ring);
+    } else {
+      // A newer action is made instead of what still waits for its time.
+      if (compare_.action() != CompareAction::kNothing) rests_.reset();
+      act(compare_.action(), now, ring);
+      compare_.advance();
+    }
+  } else {
+    return false;
+  }
+  return true;
+}
+
+void EngineOutput::act(CompareAction action, Nanoseconds now, PinRing* ring) {
+  if (action == CompareAction::kNothing) return;
+  const bool may = action == CompareAction::kPulse ? !state_.on && mayChange() <= now : true;
+  if (!isWritten() || !may) {
+    ++state_.missed;
+    return;
+  }
+  state_.too_long = false;
+  if (!write(action != CompareAction::kOff, now, ring)) {
+    ++state_.missed;
+    return;
+  }
+  ++state_.compared;
+  if (action == CompareAction::kPulse) pulse_ends_ = state_.changed + compare_.track()->pulse;
+}
+
+// ---- all ----
+
 // @return whether it has that state; otherwise the path's part has ended.
 bool EngineOutput::write(bool on, Nanoseconds now, PinRing* ring) {
   if (on == state_.on) return true;
@@ -93,6 +205,7 @@ bool EngineOutput::write(bool on, Nanoseconds now, PinRing* ring) {
   if (const int error = lines_.write(&write, 1)) {
     state_.error = error;
     end();
+    mute();
     return false;
   }
   state_.on = on;
@@ -104,9 +217,9 @@ bool EngineOutput::write(bool on, Nanoseconds now, PinRing* ring) {
 }
 
 void EngineOutput::publish() {
-  state_.reads = marks_.reads();
+  state_.reads = state_.compare != 0 ? state_.compare : marks_.reads();
   state_.made = marks_.follows() ? marks_.made() : 0;
-  state_.due = marks_.due().has_value();
+  state_.due = marks_.due().has_value() || pulse_ends_ != kNever;
   published_.store(state_);
 }
 

@@ -1,18 +1,21 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "channel/output_line.h"
 #include "channel/watched_lines.h"
 #include "port/pin_ring.h"
 #include "pulse/command.h"
 #include "pulse/snapshot.h"
+#include "timeline/compare_follower.h"
 #include "timeline/mark_follower.h"
 
 namespace stepdriver::pulse {
 
-/// The pulse thread's part of an output with a name: it writes the marks of a path at their times.
-/// While a path has the output, nothing else writes it, except to its safe state.
+/// The pulse thread's part of an output with a name: it writes the marks of a path, or what the
+/// position of an axis makes it do, at their times. While a path or an axis has the output, nothing
+/// else writes it, except to its safe state.
 class EngineOutput {
  public:
   /// @param lines, clock outlive it.
@@ -26,6 +29,19 @@ class EngineOutput {
   void follow(const FollowMarks& order);
   /// No mark is left: what wasn't made is given up. @return whether a path had the output
   bool end();
+  /// An axis has the output, which first gets the state that belongs to its place.
+  /// @pre The axis is at rest. @param joint [microsteps] where it rests
+  void compare(const Compare& order, double joint);
+  /// No axis has it any more.
+  void endCompare();
+  /// It isn't written until the next order: an emergency stop has come. @return whether it was
+  bool mute();
+  /// The channel of the axis that has it; negative: none has.
+  int channel() const { return channel_; }
+  bool hasRoom(Nanoseconds start) const { return !compare_.follows() || compare_.hasRoom(start); }
+  void followAxis(const Successors::Entry& entry, double joint) { compare_.follow(entry, joint); }
+  /// The axis has come to rest. @param reached it was where the motion led
+  void axisEnded(Nanoseconds motion_now, double joint, bool reached);
   /// An order was handled.
   void taken(std::uint64_t serial);
   std::uint64_t group() const { return state_.group; }
@@ -40,6 +56,15 @@ class EngineOutput {
  private:
   Nanoseconds markDue(Nanoseconds slipped) const;
   Nanoseconds tooLongAt() const;
+  Nanoseconds compareDue(Nanoseconds slipped) const;
+  bool serveMark(Nanoseconds now, Nanoseconds slipped, PinRing* ring);
+  bool serveCompare(Nanoseconds now, Nanoseconds slipped, PinRing* ring);
+  void act(CompareAction action, Nanoseconds now, PinRing* ring);
+  void adopt(std::uint64_t changes, bool on, Nanoseconds changed, Nanoseconds on_since);
+  Nanoseconds mayChange() const {
+    return state_.changed + (state_.on ? line_.min_on : line_.min_off);
+  }
+  bool isWritten() const { return channel_ >= 0 && !state_.muted; }
   bool write(bool on, Nanoseconds now, PinRing* ring);
   void publish();
 
@@ -47,6 +72,11 @@ class EngineOutput {
   WatchedLines& lines_;
   Clock& clock_;
   MarkFollower marks_;
+  CompareFollower compare_;
+  int channel_ = -1;           // of the axis that compare_ follows
+  std::optional<bool> rests_;  // the state that it gets as soon as its least times allow
+  Nanoseconds pulse_ends_ = kNever;
+  bool reached_ = false;  // a motion has come to its end
   OutputLineState state_;
   Nanoseconds tell_at_ = 0;  // The controller isn't told again before this clock time.
   bool untold_ = false;

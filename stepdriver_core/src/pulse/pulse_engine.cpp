@@ -219,8 +219,12 @@ Nanoseconds PulseEngine::serve() {
   if (port_.due() <= now || horizon_ != 0) servePort(now);
   scheduleChanged();
   if (horizon_ != 0) tellFollowed(now);
-  const Nanoseconds outputs_due = outputs_.empty() ? kNever : serveOutputs(now);
-  if (std::min(dues_.earliest(), port_.due()) <= now) finishDue(now);
+  Nanoseconds outputs_due = outputs_.empty() ? kNever : serveOutputs(now);
+  if (std::min(dues_.earliest(), port_.due()) <= now) {
+    finishDue(now);
+    // What the end of a motion makes them do.
+    if (!outputs_.empty()) outputs_due = serveOutputs(now);
+  }
   if (heartbeat_ && now >= heartbeat_->due()) writeHeartbeat(now);
   serveStops();
   report();
@@ -264,11 +268,17 @@ void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
   if (command.kind == Command::Kind::kEndMarks) {
     EngineOutput& output = *outputs_[command.output];
     output.end();
+    output.endCompare();
     return output.taken(command.serial);
   }
+  if (command.kind == Command::Kind::kCompare) return takeCompare(*command.compare, now);
   Channel& channel = *channels_[static_cast<std::size_t>(command.channel)];
   if (command.kind == Command::Kind::kRelease) {
     channel.release(command);
+    for (const auto& output : outputs_) {
+      // Its places were counts of the mode before.
+      if (command.scale && output->channel() == command.channel) output->endCompare();
+    }
     channel.state.accepted = command.serial;
   } else if (!channel.kin->follows() && !channel.kin->drains && !channel.guard.reserved()) {
     channel.guard.reserve();
@@ -298,6 +308,10 @@ void PulseEngine::followAll(const Command& command, Nanoseconds now) {
     if (horizon_ != 0 && !channel.motion->follows()) {
       port_.begin(channel.index, {order.still, order.squares, order.is_square, order.until_block});
     }
+    for (const auto& output : outputs_) {
+      if (output->channel() != order.channel) continue;
+      output->followAxis({order.profile, order.serial, order.settles}, channel.jointRests());
+    }
     channel.follow(order, now);
     channel.state.accepted = order.serial;
     changed(channel);
@@ -317,7 +331,7 @@ bool PulseEngine::mayFollow(const Follow& order, Nanoseconds now) const {
   const bool late = start < now - state_.slipped + horizon_ || start < channel.motion->madeUntil();
   return !late && !channel.kin->isReserved() && !channel.kin->drains &&
          order.continues == channel.motion->latest() && channel.motion->hasRoom(start) &&
-         order.faults == channel.state.faults() &&
+         outputsHaveRoom(order) && order.faults == channel.state.faults() &&
          (emergencyStopped() ? order.slows && stops_.isRamping() : order.stops == stopsAsked());
 }
 
@@ -440,6 +454,30 @@ void PulseEngine::switchOutputs(const std::vector<OutputLine>& outputs) {
   }
 }
 
+// A motion that is ordered but hasn't begun may be from before: an order of the same turn.
+void PulseEngine::takeCompare(const Compare& order, Nanoseconds now) {
+  EngineOutput& output = *outputs_[order.output];
+  const Channel& channel = *channels_[static_cast<std::size_t>(order.channel)];
+  const Follower& motion = *channel.motion;
+  const bool begins = motion.follows() && !motion.hasSuccessor() &&
+                      now - state_.slipped < motion.profile().startNs();
+  output.end();
+  output.endCompare();
+  if ((begins || !motion.follows()) && !emergencyStopped()) {
+    output.compare(order, channel.jointRests());
+    if (begins) {
+      output.followAxis({motion.profile(), motion.following(), false}, channel.jointRests());
+    }
+  }
+  output.taken(order.serial);
+}
+
+bool PulseEngine::outputsHaveRoom(const Follow& order) const {
+  return std::all_of(outputs_.begin(), outputs_.end(), [&](const auto& output) {
+    return output->channel() != order.channel || output->hasRoom(order.profile.startNs());
+  });
+}
+
 OutputLineState PulseEngine::output(std::size_t index) const { return outputs_.at(index)->state(); }
 
 std::size_t PulseEngine::outputs() const { return outputs_.size(); }
@@ -458,6 +496,7 @@ Nanoseconds PulseEngine::serveOutputs(Nanoseconds now) {
 void PulseEngine::endMarks() {
   for (const auto& output : outputs_) {
     if (output->end()) news_ = true;
+    if (output->mute()) news_ = true;
   }
 }
 
@@ -738,6 +777,11 @@ void PulseEngine::concludeEnd(Kin& kin) {
 }
 
 void PulseEngine::endOne(Channel& channel, EndReason reason, bool abrupt, Nanoseconds now) {
+  const bool done = reason == EndReason::kDone;
+  for (const auto& output : outputs_) {
+    if (output->channel() != static_cast<int>(channel.index)) continue;
+    output->axisEnded(now - state_.slipped, channel.joint(done), done && !channel.slows);
+  }
   channel.endMotion(reason, abrupt, now - state_.slipped);
   news_ = true;
   changed(channel);

@@ -146,10 +146,11 @@ class PulseEngine : private StepPort::Listener {
   ///   can't be written, that is a failure of every channel. Set before the first serve().
   void beat(const HeartbeatLine& line) { heartbeat_.emplace(line, clock_.now()); }
 
-  /// @param outputs can be switched by the marks of paths (FollowMarks), by their index here: the
-  ///   pulse thread writes each mark at its time, after the steps of that time. What ends the
-  ///   motions of a group early ends its marks, and an emergency stop ends all of them. Set before
-  ///   the first serve().
+  /// @param outputs can be switched by the marks of paths (FollowMarks) and by the positions of
+  ///   axes (Compare), by their index here: the pulse thread writes each mark at its time, after
+  ///   the steps of that time. What ends the motions of a group early ends its marks, and an
+  ///   emergency stop ends all of them; positions only count from then on, until the next order.
+  ///   Set before the first serve().
   void switchOutputs(const std::vector<OutputLine>& outputs);
   /// The state of one of them, consistent and from one instant.
   OutputLineState output(std::size_t index) const;
@@ -193,6 +194,8 @@ class PulseEngine : private StepPort::Listener {
   bool mayFollow(const Follow& order, Nanoseconds now) const;
 
   // Outputs.
+  void takeCompare(const Compare& order, Nanoseconds now);
+  bool outputsHaveRoom(const Follow& order) const;
   Nanoseconds serveOutputs(Nanoseconds now);
   void endMarks();
   void endMarksOf(std::uint64_t group);

@@ -108,6 +108,46 @@ TEST(StepFinder, FollowsRandomCubicsLikeBisectionDoes) {
   }
 }
 
+// Each line that is looked for is found as if all steps before it had been found.
+TEST(StepFinder, LeavesOutStepsWithoutMissingOrMovingTheNextOne) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> spread(-1.0, 1.0);
+  for (int round = 0; round < 500; ++round) {
+    std::vector<Piece> pieces;
+    DoubleDouble position(0.0);
+    double velocity = 0.0;
+    for (int i = 0; i < 4; ++i) {
+      const bool cruises = spread(random) > 0.5;
+      const Piece piece{0.01 + 0.2 * std::abs(spread(random)), position, velocity,
+                        cruises ? 0.0 : 8000.0 * spread(random),
+                        cruises || round % 2 == 0 ? 0.0 : 60000.0 * spread(random)};
+      pieces.push_back(piece);
+      position = piece.positionAt(piece.duration);
+      velocity = piece.velocityAt(piece.duration).value();
+    }
+    const Profile profile(0, pieces);
+    const std::vector<Step> all = allSteps(profile, 0);
+    StepFinder finder(profile, 0);
+    const std::int64_t distance = 1 + round % 40;
+    std::int64_t low = -distance;
+    std::int64_t high = distance;
+    std::int64_t count = 0;
+    for (const Step& step : all) {
+      count += step.direction;
+      if (count != low && count != high) continue;
+      Step found;
+      ASSERT_TRUE(finder.nextTo(low, high, found)) << "round " << round;
+      ASSERT_LE(std::abs(found.time_ns - step.time_ns), 1) << "round " << round;
+      ASSERT_EQ(found.direction, step.direction);
+      ASSERT_EQ(finder.count(), count);
+      low = count - distance;
+      high = count + distance;
+    }
+    Step none;
+    ASSERT_FALSE(finder.nextTo(low, high, none)) << "round " << round;
+  }
+}
+
 // A sum of parts leaves an acceleration or a jerk of either sign that should be 0.
 TEST(StepFinder, KeepsAConstantSpeedWhateverResidualItsAccelerationIs) {
   for (const double residual : {-1e-9, -1e-13, -1e-30, 1e-30, 1e-13}) {

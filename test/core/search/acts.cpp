@@ -107,6 +107,14 @@ std::deque<Turn> holdsAndFeeds(std::size_t steps) {
           {pause(27), append("tell the end of the path", 0.0, true)}};
 }
 
+/// Its position must be known for that.
+std::deque<Turn> comparesTool(std::size_t /*steps*/) {
+  const Act compare{"the position of y switches the tool",
+                    [](Participants& all, int client) { all.compareTool(client); }};
+  return {{0, request("position of y", machine::SetPosition{kY, 0.0}, {})},
+          {kMillisecond, compare}};
+}
+
 /// An act of several acts, which differ with the steps before.
 Act inTurn(const std::string& name, std::deque<Turn> (*turns_after)(std::size_t steps)) {
   return {name,
@@ -244,6 +252,7 @@ std::vector<Act> makeActs() {
       slowPath(40e-6, 1e-6),
       {"switch the tool on", [](Participants& all, int client) { all.switchTool(client, true); }},
       {"switch the tool off", [](Participants& all, int client) { all.switchTool(client, false); }},
+      inTurn("the position of y switches the tool", comparesTool),
   };
 }
 

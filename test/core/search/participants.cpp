@@ -36,6 +36,8 @@ constexpr pulse::Nanoseconds kLongestLead = 40 * kMillisecond;
 constexpr const char* kEmergencyStop = "emergency_stop";
 /// An output with a name.
 constexpr const char* kTool = "tool";
+/// [m] A position of y can switch it, on in here: as far as a move takes the axis.
+constexpr config::PositionCompare::Cam kToolCam{-0.001, 0.001};
 /// The period of a stream of jogs, and their number.
 constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
 constexpr int kJogs = 12;
@@ -1338,6 +1340,14 @@ void Participants::switchTool(int client, bool on) {
        {});
 }
 
+void Participants::compareTool(int client) {
+  config::PositionCompare compare;
+  compare.axis = configs_[kY].name;
+  compare.cams = {kToolCam};
+  post(client, "the position of y switches the tool",
+       machine::SetPositionCompare{kTool, std::move(compare)}, {});
+}
+
 void Participants::emergencyStop(int client) {
   Client& who = clients_[static_cast<std::size_t>(client)];
   who.waits_for_stops = engine_->emergencyStop();
@@ -1604,6 +1614,24 @@ void Participants::checkRest() {
   }
 }
 
+// At rest in its cam an output is on, and out of it off, however the axis got there.
+void Participants::checkCompared() {
+  const pulse::OutputLineState tool = engine_->output(0);
+  const pulse::ChannelState y = engine_->channel(static_cast<int>(kY));
+  if (tool.compare == 0 || tool.muted || tool.too_long || y.following != 0 || pins_failed_) return;
+  const config::OutputConfig& config = optionsOf(schedule_.variant).outputs[0];
+  if (clock_.now() < tool.changed + config.min_on_ns) return;
+  const machine::AxisSnapshot& now = controller_->snapshot()->axes[kY];
+  const double place = static_cast<double>(y.count - y.slack) + y.between;
+  const auto count_of = [&now](double at) { return (at - now.origin) * now.steps_per_unit; };
+  const double to_edge = std::min(place - count_of(kToolCam.from), count_of(kToolCam.to) - place);
+  // Motors that axes share stand up to a microstep beside where their motion led.
+  if (std::abs(to_edge) < 2.0) return;
+  if (rig_.outputLevel(kTool) == config.level(to_edge > 0.0)) return;
+  oracle_.complain("y stands at " + std::to_string(now.origin + place / now.steps_per_unit) +
+                   " m, but the tool is " + (to_edge > 0.0 ? "off" : "on"));
+}
+
 // An emergency stop that nothing has ended leaves no motor with current, if it is configured so.
 void Participants::checkPower() {
   const bool off = emergencyDisableOf(schedule_.variant) != machine::EmergencyDisable::kHold;
@@ -1795,6 +1823,7 @@ std::vector<std::string> Participants::run() {
   if (oracle_.complaints.empty()) checkOutcomes();
   if (oracle_.complaints.empty()) checkCounts("at rest");
   if (oracle_.complaints.empty()) checkRest();
+  if (oracle_.complaints.empty()) checkCompared();
   for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);
   if (oracle_.complaints.empty()) {
     loses_edges_ = false;

@@ -155,6 +155,8 @@ class Participants : private machine::ShellCore::Host {
   /// @param size of the segment; 0: none, only that this is the end.
   void appendToPath(int client, std::size_t axis, double size, bool is_last);
   void switchTool(int client, bool on);
+  /// The position of y switches the tool: a cam around where it begins.
+  void compareTool(int client);
   void emergencyStop(int client);
   void shutDown(int client);
   void stopLastMove(int client, std::size_t axis);
@@ -303,6 +305,7 @@ class Participants : private machine::ShellCore::Host {
   void checkPowered(std::size_t axis, pulse::Nanoseconds now);
   sim::RigAxisReport reportOf(const std::string& rig_axis) const;
   void checkRest();
+  void checkCompared();
   void checkPower();
   bool ramps() const;
   std::optional<pulse::Nanoseconds> rampBegins() const;

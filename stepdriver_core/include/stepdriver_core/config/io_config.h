@@ -3,11 +3,44 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/config/axis_config.h"
 
 /// Lines with a name, which belong to a machine and to none of its axes.
 namespace stepdriver::config {
+
+/// What the position of an axis makes an output do: position compare for a camera or a dispenser,
+/// cam switches for a valve. Each action comes at the nanosecond at which the joint arrives at its
+/// place, and never stops the axis.
+struct PositionCompare {
+  /// In which the axis must move.
+  enum class Direction { kBoth, kUp, kDown };
+  /// On between two places.
+  struct Cam {
+    double from = 0.0;  ///< [m] or [rad], as all places of the axis
+    double to = 0.0;
+  };
+  /// A pulse at `from`, and then at each further `distance` as far as `to`.
+  struct Every {
+    double distance = 0.0;  ///< [m] or [rad]
+    double from = 0.0;
+    double to = 0.0;
+  };
+  std::string axis;
+  Direction direction = Direction::kBoth;
+  /// @name Either cams, or pulses at any of the others
+  /// @{
+  std::vector<Cam> cams;
+  std::vector<double> places;  ///< a pulse at each
+  std::optional<Every> every;
+  bool at_end = false;  ///< a pulse when a motion has come to its target
+  /// @}
+  std::int64_t pulse_ns = 0;  ///< how long a pulse is on
+  /// [ns] How much earlier it is switched than at the place: for what needs time to act.
+  std::int64_t lead_on_ns = 0;
+  std::int64_t lead_off_ns = 0;
+};
 
 /// An output: a relay, a pump, a laser, the magnet that lifts a pen.
 ///

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,12 @@ struct OutputState {
   std::optional<pulse::Nanoseconds> changed;
   std::string note;   ///< why nobody's command has switched it; empty until that happens
   std::string error;  ///< why its line could not be written, so that `on` isn't certain
+  std::string axis;   ///< whose position switches it; empty: none does
+  /// What positions have made it do since the start.
+  std::uint64_t compared = 0;
+  /// What they could not: a pulse was due while the one before it was on, or the output was in its
+  /// safe state.
+  std::uint64_t missed = 0;
 };
 
 /// The state of an input with a name.
@@ -43,7 +50,8 @@ struct IoStates {
 
 inline bool operator==(const OutputState& one, const OutputState& other) {
   return one.name == other.name && one.on == other.on && one.changed == other.changed &&
-         one.note == other.note && one.error == other.error;
+         one.note == other.note && one.error == other.error && one.axis == other.axis &&
+         one.compared == other.compared && one.missed == other.missed;
 }
 inline bool operator==(const InputState& one, const InputState& other) {
   return one.name == other.name && one.active == other.active && one.changed == other.changed &&

@@ -323,6 +323,28 @@ class Machine {
   /// @throw GpioError if its line can't be written; then all axes have a fault.
   void setOutput(const std::string& name, bool on);
 
+  /// Lets the position of an axis switch an output, at the nanosecond at which the joint arrives at
+  /// a place, until clearPositionCompare(). Nothing else switches it meanwhile, except to its safe
+  /// state. Returns when the next motion will.
+  ///
+  ///     config::PositionCompare camera;
+  ///     camera.axis = "x";
+  ///     camera.every = config::PositionCompare::Every{0.002, 0.01, 0.21};
+  ///     camera.pulse_ns = 1'000'000;
+  ///     machine.setPositionCompare("camera", camera);
+  ///
+  /// It is a passage of the joint that counts: with backlash, an input shaper, or axes that share
+  /// motors, too. While the position can't be trusted (AxisState::position_valid), during a homing,
+  /// and while outputs are in their safe states, the output isn't switched by it. Then, and if a
+  /// pulse is due while the one before it is on, OutputState::missed counts what isn't made.
+  ///
+  /// @throw Refused if there is no such output or axis, a place is outside its soft limits, the
+  ///   output can't be switched as fast as the top speed of the axis would need it, or the axis
+  ///   moves.
+  void setPositionCompare(const std::string& output, const config::PositionCompare& compare);
+  /// No position switches it any more: it goes off. @throw Refused if there is no such output.
+  void clearPositionCompare(const std::string& output);
+
   /// The outputs and inputs with a name.
   IoStates ioStates() const;
 

@@ -30,6 +30,7 @@
 #include "set_microsteps.h"
 #include "set_output.h"
 #include "set_position.h"
+#include "set_position_compare.h"
 #include "set_speed_override.h"
 #include "sleep.h"
 #include "stop_all.h"
@@ -44,8 +45,8 @@ using Request =
     std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine,
                  FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll, Hold, Resume,
                  SetSpeedOverride, SetLimits, SetCurrent, Home, CancelHoming, Enable, Sleep, Reset,
-                 SetMicrosteps, SetPosition, Recover, SetOutput, BringUp, RestorePosition,
-                 NotePosition, Close, AwaitRest, PowerDown>;
+                 SetMicrosteps, SetPosition, Recover, SetOutput, SetPositionCompare, BringUp,
+                 RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
 
 /// Whether it may be refused because of the level of a switch: the inputs are read when it is made.
 inline bool readsInputs(const Request& request) {

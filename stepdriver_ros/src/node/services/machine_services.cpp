@@ -10,6 +10,7 @@
 #include <stepdriver/PlanPath.h>
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SetOutput.h>
+#include <stepdriver/SetPositionCompare.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <chrono>
@@ -22,6 +23,7 @@
 #include "node/calls/bounded.h"
 #include "node/line_request.h"
 #include "node/path_request.h"
+#include "node/position_compare_request.h"
 #include "respond.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
@@ -143,6 +145,7 @@ MachineServices::MachineServices(const ros::NodeHandle& node, machine::Machine& 
       triggerHandler("the hold is over: held motions continue", [&machine] { machine.resume(); })));
   advertiseSpeedOverride(machine);
   advertiseSetOutput(machine);
+  advertiseSetPositionCompare(machine);
   advertiseCoordinatedMoves(machine);
 }
 
@@ -220,6 +223,25 @@ void MachineServices::advertiseSetOutput(machine::Machine& machine) {
       };
   node_.setCallbackQueue(&queues_.outputs());
   servers_.push_back(node_.advertiseService("set_output", handler));
+}
+
+void MachineServices::advertiseSetPositionCompare(machine::Machine& machine) {
+  using Request = SetPositionCompare::Request;
+  const boost::function<bool(Request&, SetPositionCompare::Response&)> handler =
+      [&machine](Request& request, SetPositionCompare::Response& response) {
+        return respond(response, [&] {
+          if (request.axis.empty()) {
+            machine.clearPositionCompare(request.output);
+            response.message = fmt::format("no position switches {}", request.output);
+            return;
+          }
+          machine.setPositionCompare(request.output, positionCompare(request));
+          response.message =
+              fmt::format("the position of {} switches {}", request.axis, request.output);
+        });
+      };
+  node_.setCallbackQueue(&queues_.outputs());
+  servers_.push_back(advertiseBounded(node_, "set_position_compare", handler));
 }
 
 void MachineServices::advertiseRig(setup::Simulation& simulation) {

@@ -28,6 +28,7 @@ class MachineServices {
                         setup::Simulation::End end);
   void advertiseInput(setup::Simulation& simulation, const std::string& name);
   void advertiseSetOutput(machine::Machine& machine);
+  void advertiseSetPositionCompare(machine::Machine& machine);
   void advertiseSpeedOverride(machine::Machine& machine);
   void advertiseCoordinatedMoves(machine::Machine& machine);
 

@@ -76,6 +76,9 @@ void IoPublisher::publish(const Change& change) {
     message.output_changed.push_back(time_of(output.changed));
     message.output_note.push_back(output.note);
     message.output_error.push_back(output.error);
+    message.output_axis.push_back(output.axis);
+    message.output_compared.push_back(output.compared);
+    message.output_missed.push_back(output.missed);
   }
   for (const machine::InputState& input : change.states.inputs) {
     message.input_name.push_back(input.name);

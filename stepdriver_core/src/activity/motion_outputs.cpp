@@ -1,10 +1,11 @@
-#include "path_outputs.h"
+#include "motion_outputs.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "compare_plan.h"
 #include "context.h"
 #include "message_text.h"
 #include "stepdriver_core/error.h"
@@ -33,7 +34,7 @@ std::string MarksOfPath::text() const {
   return text;
 }
 
-PathOutputs::PathOutputs(const std::vector<config::OutputConfig>& outputs) {
+MotionOutputs::MotionOutputs(const std::vector<config::OutputConfig>& outputs) {
   for (const config::OutputConfig& config : outputs) {
     Output& output = outputs_.emplace_back();
     output.config = config;
@@ -43,7 +44,7 @@ PathOutputs::PathOutputs(const std::vector<config::OutputConfig>& outputs) {
 
 // ---- the engine ----
 
-void PathOutputs::update(const std::vector<pulse::OutputLineState>& states) {
+void MotionOutputs::update(const std::vector<pulse::OutputLineState>& states) {
   for (std::size_t i = 0; i < outputs_.size(); ++i) {
     Output& output = outputs_[i];
     const pulse::OutputLineState& state = output.state = states.at(i);
@@ -72,31 +73,133 @@ void PathOutputs::update(const std::vector<pulse::OutputLineState>& states) {
 
 // ---- the owner of a line ----
 
-std::string PathOutputs::holder(std::size_t output) const {
+std::string MotionOutputs::holder(std::size_t output) const {
+  if (const std::string& axis = comparedAxis(output); !axis.empty()) {
+    return "the position of " + axis;
+  }
   const auto& axes = outputs_[output].taken_by->axes;
   return "a path of " + joinedText(axes, [](const axis::AxisModel* axis) { return axis->name(); });
 }
 
-void PathOutputs::end(Context& context, std::size_t number) {
+void MotionOutputs::end(Context& context, std::size_t number) {
   Output& output = outputs_[number];
   if (!output.taken_by || output.taken_by->ends) return;
   output.taken_by->ends = ++output.serial;
+  if (output.taken_by->compares) output.wanted = false;
   pulse::Command& command = context.out->commands.emplace_back();
   command.kind = pulse::Command::Kind::kEndMarks;
   command.output = number;
   command.serial = output.serial;
 }
 
-std::optional<bool> PathOutputs::takeWanted(std::size_t output) {
+std::optional<bool> MotionOutputs::takeWanted(std::size_t output) {
   return std::exchange(outputs_[output].wanted, std::nullopt);
+}
+
+// ---- the position of an axis ----
+
+const std::string& MotionOutputs::comparedAxis(std::size_t output) const {
+  static const std::string kNone;
+  const auto& compared = outputs_[output].compared;
+  return compared ? compared->compare.axis : kNone;
+}
+
+void MotionOutputs::compare(std::size_t number, std::optional<config::PositionCompare> compare,
+                            std::size_t axis, const SharedCall& call) {
+  Output& output = outputs_.at(number);
+  if (!compare) {
+    output.compared.reset();
+    return;
+  }
+  const std::uint64_t serial = output.compared ? output.compared->serial : 0;
+  output.compared = Compared{*std::move(compare), axis, call, true, serial};
+}
+
+// Its places are counts, so each order is for one origin and one microstep mode.
+bool MotionOutputs::isCurrent(const Output& output, const axis::AxisModel& axis) {
+  const Compared& compared = *output.compared;
+  return !compared.changed && compared.origin == axis.position.origin() &&
+         compared.steps_per_unit == axis.stepsPerUnit();
+}
+
+void MotionOutputs::supervise(Context& context, const std::string& why_safe,
+                              const std::function<bool(const axis::AxisModel&)>& may) {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    Output& output = outputs_[i];
+    const bool has_it = output.taken_by && output.taken_by->compares;
+    if (!output.compared) {
+      if (has_it) end(context, i);
+      continue;
+    }
+    const axis::AxisModel& axis = *context.axes.at(output.compared->axis);
+    const bool wants = why_safe.empty() && axis.position.isValid() && may(axis);
+    if (!wants) {
+      output.compared->call.reset();
+      if (has_it) end(context, i);
+      continue;
+    }
+    const bool rests = axis.motor.state().following == 0;
+    if (!has_it) {
+      if (!output.taken_by && output.line.why_not.empty() && rests) {
+        orderCompare(context, i, output, axis);
+      }
+      continue;
+    }
+    if (output.taken_by->ends) continue;
+    const bool is_open = output.state.taken < output.compared->serial;
+    const bool lost =
+        !is_open && (output.state.compare != output.compared->serial || output.state.muted);
+    const bool current = isCurrent(output, axis);
+    if (current && !lost) {
+      if (!is_open) output.compared->call.reset();
+    } else if (rests) {
+      orderCompare(context, i, output, axis);
+    } else if (!current) {
+      end(context, i);
+    }
+  }
+}
+
+void MotionOutputs::orderCompare(Context& context, std::size_t number, Output& output,
+                                 const axis::AxisModel& axis) {
+  Compared& compared = *output.compared;
+  const auto track = std::make_shared<const pulse::CompareTrack>(trackOf(compared.compare, axis));
+  const auto order = std::make_shared<pulse::Compare>();
+  order->output = number;
+  order->serial = ++output.serial;
+  order->channel = static_cast<int>(compared.axis);
+  order->track = track.get();
+  order->changes = output.state.changes;
+  order->on = output.line.on;
+  order->changed = output.line.changed;
+  order->on_since = output.line.on_since;
+  compared.serial = order->serial;
+  compared.changed = false;
+  compared.origin = axis.position.origin();
+  compared.steps_per_unit = axis.stepsPerUnit();
+  Taken taken;
+  taken.axes = {&axis};
+  taken.compares = true;
+  output.taken_by = taken;
+  output.wanted.reset();
+  output.kept.push_back({order->serial, nullptr, nullptr, nullptr, track, order});
+  pulse::Command& command = context.out->commands.emplace_back();
+  command.kind = pulse::Command::Kind::kCompare;
+  command.compare = order.get();
+  command.output = number;
+  command.serial = order->serial;
 }
 
 // ---- a path ----
 
-void PathOutputs::refuseUnlessFree(const motion::PathMarks& marks, std::uint64_t group,
-                                   const std::vector<const axis::AxisModel*>& axes) const {
+void MotionOutputs::refuseUnlessFree(const motion::PathMarks& marks, std::uint64_t group,
+                                     const std::vector<const axis::AxisModel*>& axes) const {
   for (const motion::OutputMarks& own : marks) {
     const Output& output = outputs_.at(own.output);
+    if (output.compared) {
+      throw Refused(
+          fmt::format("the output {}: {} switches it", output.config.name, holder(own.output)));
+    }
     if (has(output, group) && !output.taken_by->ends) continue;
     if (output.taken_by) {
       const auto& others = output.taken_by->axes;
@@ -113,8 +216,8 @@ void PathOutputs::refuseUnlessFree(const motion::PathMarks& marks, std::uint64_t
   }
 }
 
-void PathOutputs::take(const motion::PathMarks& marks, const std::shared_ptr<MarksOfPath>& path,
-                       const std::vector<const axis::AxisModel*>& axes) {
+void MotionOutputs::take(const motion::PathMarks& marks, const std::shared_ptr<MarksOfPath>& path,
+                         const std::vector<const axis::AxisModel*>& axes) {
   refuseUnlessFree(marks, path->group, axes);
   if (path->parts.empty()) paths_.emplace_back(path);
   for (const motion::OutputMarks& own : marks) {
@@ -133,7 +236,7 @@ void PathOutputs::take(const motion::PathMarks& marks, const std::shared_ptr<Mar
   }
 }
 
-pulse::Nanoseconds PathOutputs::mayBegin(const motion::PathMarks& marks) const {
+pulse::Nanoseconds MotionOutputs::mayBegin(const motion::PathMarks& marks) const {
   pulse::Nanoseconds earliest = 0;
   for (const motion::OutputMarks& own : marks) {
     const Output& output = outputs_.at(own.output);
@@ -147,10 +250,10 @@ pulse::Nanoseconds PathOutputs::mayBegin(const motion::PathMarks& marks) const {
   return earliest;
 }
 
-void PathOutputs::order(std::uint64_t group, const std::shared_ptr<const motion::Profile>& along,
-                        const std::shared_ptr<const motion::PathMarks>& marks,
-                        pulse::Nanoseconds delay,
-                        const std::shared_ptr<std::vector<pulse::FollowMarks>>& command) {
+void MotionOutputs::order(std::uint64_t group, const std::shared_ptr<const motion::Profile>& along,
+                          const std::shared_ptr<const motion::PathMarks>& marks,
+                          pulse::Nanoseconds delay,
+                          const std::shared_ptr<std::vector<pulse::FollowMarks>>& command) {
   for (const motion::OutputMarks& own : *marks) {
     Output& output = outputs_.at(own.output);
     if (!has(output, group) || output.taken_by->ends) continue;
@@ -166,18 +269,18 @@ void PathOutputs::order(std::uint64_t group, const std::shared_ptr<const motion:
     follow.on = output.line.on;
     follow.changed = output.line.changed;
     follow.on_since = output.line.on_since;
-    output.kept.push_back({follow.serial, along, marks, command});
+    output.kept.push_back({follow.serial, along, marks, command, nullptr, nullptr});
   }
 }
 
-bool PathOutputs::isDue(std::uint64_t group) const {
+bool MotionOutputs::isDue(std::uint64_t group) const {
   return std::any_of(outputs_.begin(), outputs_.end(), [&](const Output& output) {
     return has(output, group) && !output.taken_by->ends && output.state.group == group &&
            output.state.due;
   });
 }
 
-void PathOutputs::stop(Context& context, std::uint64_t group) {
+void MotionOutputs::stop(Context& context, std::uint64_t group) {
   for (std::size_t i = 0; i < outputs_.size(); ++i) {
     Output& output = outputs_[i];
     if (!has(output, group) || output.taken_by->ends || !output.config.at_stop) continue;
@@ -186,7 +289,7 @@ void PathOutputs::stop(Context& context, std::uint64_t group) {
   }
 }
 
-void PathOutputs::leave(Context& context, std::uint64_t group, bool reached) {
+void MotionOutputs::leave(Context& context, std::uint64_t group, bool reached) {
   if (!reached) stop(context, group);
   for (std::size_t i = 0; i < outputs_.size(); ++i) {
     if (has(outputs_[i], group)) end(context, i);

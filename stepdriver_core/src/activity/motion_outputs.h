@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "call.h"
 #include "channel/output_line.h"
 #include "profile/marks.h"
 #include "profile/profile.h"
@@ -39,12 +41,12 @@ struct MarksOfPath {
   std::string text() const;
 };
 
-/// The outputs with a name, as far as paths have them: which path has which, what was ordered of
-/// the pulse thread, and what that has made of it.
-class PathOutputs {
+/// The outputs with a name, as far as motions switch them: which path or which axis has which, what
+/// was ordered of the pulse thread, and what that has made of it.
+class MotionOutputs {
  public:
-  PathOutputs() = default;
-  explicit PathOutputs(const std::vector<config::OutputConfig>& outputs);
+  MotionOutputs() = default;
+  explicit MotionOutputs(const std::vector<config::OutputConfig>& outputs);
 
   /// The engine's news.
   void update(const std::vector<pulse::OutputLineState>& states);
@@ -52,21 +54,39 @@ class PathOutputs {
   /// @name For the owner of an output's line
   /// @{
   struct Line {
-    std::string why_not;  ///< why no path can have it now; empty: one can
+    std::string why_not;  ///< why no motion can have it now; empty: one can
     bool on = false;
     pulse::Nanoseconds changed = 0;  ///< clock time before which it has not changed
     pulse::Nanoseconds on_since = 0;
   };
   void note(std::size_t output, Line line) { outputs_[output].line = std::move(line); }
   const pulse::OutputLineState& state(std::size_t output) const { return outputs_[output].state; }
-  /// A path has it: nothing else switches it, except to its safe state.
+  /// A motion has it: nothing else switches it, except to its safe state.
   bool isTaken(std::size_t output) const { return outputs_[output].taken_by.has_value(); }
   /// Who has it, in words.
   std::string holder(std::size_t output) const;
-  /// Gives up what is left of the marks of an output.
+  /// Gives up what is left of the marks of an output, or takes it from an axis.
   void end(Context& context, std::size_t output);
-  /// What a path that has ended early has left to be done; only the first call tells.
+  /// What a motion that has ended early has left to be done; only the first call tells.
   std::optional<bool> takeWanted(std::size_t output);
+  /// @}
+
+  /// @name For the position of an axis
+  /// @{
+
+  /// The position of an axis switches an output from now on, whenever it can be trusted.
+  /// @param compare empty: none does any more. @param axis by its number.
+  /// @param call is answered when that is so, or when it must wait until the position can be
+  /// trusted.
+  void compare(std::size_t output, std::optional<config::PositionCompare> compare, std::size_t axis,
+               const SharedCall& call);
+  /// Whose position switches an output; empty: none does.
+  const std::string& comparedAxis(std::size_t output) const;
+  /// Orders what has changed: positions that can be trusted now, or not any more.
+  /// @param why_safe why all outputs must be in their safe states; empty: they needn't.
+  /// @param may whether the places of an axis mean something now.
+  void supervise(Context& context, const std::string& why_safe,
+                 const std::function<bool(const axis::AxisModel&)>& may);
   /// @}
 
   /// @name For a path
@@ -97,6 +117,18 @@ class PathOutputs {
     std::uint64_t group = 0;
     std::vector<const axis::AxisModel*> axes;
     std::optional<std::uint64_t> ends;  // serial of the command that ends it
+    bool compares = false;              // the position of the axis has it, and no path
+  };
+  // What the position of an axis makes of it.
+  struct Compared {
+    config::PositionCompare compare;
+    std::size_t axis = 0;
+    SharedCall call;
+    bool changed = false;  // since the last order
+    // What the last order was made for.
+    std::uint64_t serial = 0;
+    double origin = 0.0;
+    double steps_per_unit = 0.0;
   };
   // Data that the engine may still read.
   struct Kept {
@@ -104,6 +136,8 @@ class PathOutputs {
     std::shared_ptr<const motion::Profile> along;
     std::shared_ptr<const motion::PathMarks> marks;
     std::shared_ptr<const std::vector<pulse::FollowMarks>> command;
+    std::shared_ptr<const pulse::CompareTrack> track;
+    std::shared_ptr<const pulse::Compare> compare;
   };
   struct Output {
     config::OutputConfig config;
@@ -111,9 +145,14 @@ class PathOutputs {
     Line line;
     std::uint64_t serial = 0;  // that the last command has
     std::optional<Taken> taken_by;
+    std::optional<Compared> compared;
     std::optional<bool> wanted;  // when it is free again
     std::deque<Kept> kept;
   };
+
+  static bool isCurrent(const Output& output, const axis::AxisModel& axis);
+  static void orderCompare(Context& context, std::size_t number, Output& output,
+                           const axis::AxisModel& axis);
 
   bool has(const Output& output, std::uint64_t group) const {
     return output.taken_by && output.taken_by->group == group;

@@ -1,0 +1,692 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
+#include "support/corexy_bench.h"
+#include "support/gantry_bench.h"
+#include "support/path_bench.h"
+#include "support/refusal.h"
+
+// Outputs that the position of an axis switches. The judge knows only the rig's trace: the joint
+// follows the steps of the motor with the play of the backlash, and each arrival at a place is to
+// have its edge at the nanosecond of that step.
+
+namespace stepdriver {
+namespace {
+
+using config::PositionCompare;
+using machine::OutputState;
+using test::Bench;
+using test::kMicrostep;
+using test::kMillisecond;
+using test::kNan;
+using test::kSecond;
+using Direction = PositionCompare::Direction;
+
+/// When the joint of an axis has come to which count, by the trace.
+struct Arrival {
+  std::int64_t time_ns = 0;
+  std::int64_t count = 0;
+  int direction = 0;
+};
+
+struct Edge {
+  std::int64_t time_ns = 0;
+  bool on = false;
+};
+
+class PositionCompareTest : public test::PathBench {
+ protected:
+  void SetUp() override {
+    options.outputs.resize(2);
+    options.outputs[0].name = "camera";
+    options.outputs[0].line = "camera.line";
+    options.outputs[1].name = "valve";
+    options.outputs[1].line = "valve.line";
+    options.outputs[1].active_level = false;
+    axes = {plotterAxis("x"), plotterAxis("y")};
+    begin();
+  }
+
+  void begin() {
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
+    for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
+    bench = std::make_unique<Bench>(axes, specs, false, 0.0, options);
+    for (const config::AxisConfig& axis : axes) bench->axis(axis.name).setPosition(0.0);
+  }
+
+  static PositionCompare every(double distance, double from, double to, double pulse = 1e-3) {
+    PositionCompare compare;
+    compare.axis = "x";
+    compare.every = PositionCompare::Every{distance, from, to};
+    compare.pulse_ns = std::llround(pulse * 1e9);
+    return compare;
+  }
+  static PositionCompare at(std::vector<double> places, double pulse = 1e-3) {
+    PositionCompare compare;
+    compare.axis = "x";
+    compare.places = std::move(places);
+    compare.pulse_ns = std::llround(pulse * 1e9);
+    return compare;
+  }
+  static PositionCompare cam(double from, double to) {
+    PositionCompare compare;
+    compare.axis = "x";
+    compare.cams = {{from, to}};
+    return compare;
+  }
+
+  void move(double target, const std::string& axis = "x") {
+    const axis::MoveResult result = bench->axis(axis).wait(bench->axis(axis).moveTo(target));
+    EXPECT_EQ(result.end, axis::MoveEnd::kReached) << result.message;
+  }
+
+  std::vector<Edge> edges(std::size_t output = 0) const {
+    const config::OutputConfig& config = options.outputs[output];
+    std::vector<Edge> all;
+    for (const bool on : {true, false}) {
+      for (const std::int64_t time :
+           bench->trace->times("outputs", config.name, on == config.active_level)) {
+        all.push_back({time, on});
+      }
+    }
+    std::sort(all.begin(), all.end(), [](const Edge& a, const Edge& b) {
+      return a.time_ns != b.time_ns ? a.time_ns < b.time_ns : !a.on && b.on;
+    });
+    return all;
+  }
+  std::vector<std::int64_t> switchedOn(std::size_t output = 0) const {
+    std::vector<std::int64_t> times;
+    for (const Edge& edge : edges(output)) {
+      if (edge.on) times.push_back(edge.time_ns);
+    }
+    return times;
+  }
+  OutputState shown(std::size_t output = 0) { return machine().ioStates().outputs.at(output); }
+
+  /// @param play [microsteps] all of the backlash
+  std::vector<Arrival> arrivals(std::int64_t play = 0, const std::string& name = "x") const {
+    const sim::MemoryTrace& trace = *bench->trace;
+    const int step = trace.pin(name, "step");
+    const int dir = trace.pin(name, "dir");
+    bool forward = trace.levels()[static_cast<std::size_t>(dir)];
+    std::vector<Arrival> found;
+    std::int64_t count = 0;
+    std::int64_t slack = 0;
+    for (const sim::MemoryTrace::Edge& edge : trace.edges()) {
+      if (edge.pin == dir) forward = edge.level;
+      if (edge.pin != step || !edge.level) continue;
+      if (forward && slack < play) {
+        ++slack;
+      } else if (!forward && slack > 0) {
+        --slack;
+      } else {
+        const int direction = forward ? 1 : -1;
+        found.push_back({edge.time_ns, count += direction, direction});
+      }
+    }
+    return found;
+  }
+  /// The times of the arrivals at these counts.
+  static std::vector<std::int64_t> timesAt(const std::vector<Arrival>& arrivals,
+                                           const std::vector<std::int64_t>& counts,
+                                           int direction = 0) {
+    std::vector<std::int64_t> times;
+    for (const Arrival& arrival : arrivals) {
+      if (direction != 0 && arrival.direction != direction) continue;
+      if (std::find(counts.begin(), counts.end(), arrival.count) == counts.end()) continue;
+      times.push_back(arrival.time_ns);
+    }
+    return times;
+  }
+  static std::vector<std::int64_t> multiples(std::int64_t of, std::int64_t first,
+                                             std::int64_t last) {
+    std::vector<std::int64_t> all;
+    for (std::int64_t count = first; count <= last; count += of) all.push_back(count);
+    return all;
+  }
+  static void expectTimes(const std::vector<std::int64_t>& times,
+                          const std::vector<std::int64_t>& wanted) {
+    ASSERT_EQ(times.size(), wanted.size());
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      ASSERT_LE(std::abs(times[i] - wanted[i]), 1) << i << " at " << times[i];
+    }
+  }
+
+  machine::MachineOptions options;
+  std::vector<config::AxisConfig> axes;
+};
+
+// The camera of the examples: every 2 mm at 100 mm/s.
+TEST_F(PositionCompareTest, ACameraIsTriggeredEvery2MmAt100MmPerSecond) {
+  machine().setPositionCompare("camera", every(0.002, 0.01, 0.09, 1e-3));
+  EXPECT_EQ(shown().axis, "x");
+  move(0.1);
+  const auto wanted = timesAt(arrivals(), multiples(160, 800, 7200));
+  ASSERT_EQ(wanted.size(), 41U);
+  expectTimes(switchedOn(), wanted);
+  for (std::size_t i = 0; i + 1 < edges().size(); i += 2) {
+    EXPECT_EQ(edges()[i + 1].time_ns - edges()[i].time_ns, kMillisecond) << i;
+  }
+  EXPECT_EQ(shown().compared, 41U);
+  EXPECT_EQ(shown().missed, 0U);
+  // At the top speed, 2 mm take 20 ms.
+  EXPECT_EQ(wanted[21] - wanted[20], 20 * kMillisecond);
+  expectAtRest();
+}
+
+TEST_F(PositionCompareTest, ItCostsTheAxisNoTime) {
+  move(0.05);
+  const auto without = arrivals();
+  begin();
+  machine().setPositionCompare("camera", every(0.00125, 0.0, 0.05, 1e-4));
+  move(0.05);
+  const auto with_camera = arrivals();
+  ASSERT_EQ(with_camera.size(), without.size());
+  for (std::size_t i = 1; i < without.size(); ++i) {
+    ASSERT_EQ(with_camera[i].time_ns - with_camera[0].time_ns,
+              without[i].time_ns - without[0].time_ns);
+  }
+}
+
+TEST_F(PositionCompareTest, EachPassageCountsOnceInBothDirectionsAndAtReversals) {
+  machine().setPositionCompare("camera", at({0.01}, 1e-4));
+  move(0.02);
+  move(0.0);
+  EXPECT_EQ(switchedOn().size(), 2U);
+  // Exactly to the place, and on.
+  move(0.01);
+  EXPECT_EQ(switchedOn().size(), 3U);
+  move(0.02);
+  EXPECT_EQ(switchedOn().size(), 3U) << "it was there already";
+  move(0.01);
+  EXPECT_EQ(switchedOn().size(), 4U);
+  move(0.0);
+  EXPECT_EQ(switchedOn().size(), 4U);
+  // To the place and back, then not quite to it.
+  move(0.01);
+  move(0.0);
+  EXPECT_EQ(switchedOn().size(), 5U);
+  move(0.01 - kMicrostep);
+  move(0.0);
+  EXPECT_EQ(switchedOn().size(), 5U);
+  expectTimes(switchedOn(), timesAt(arrivals(), {800}));
+  EXPECT_EQ(shown().compared, 5U);
+}
+
+TEST_F(PositionCompareTest, OneDirectionOnly) {
+  PositionCompare up = at({0.01, 0.012}, 1e-4);
+  up.direction = Direction::kUp;
+  machine().setPositionCompare("camera", up);
+  PositionCompare down = at({0.01, 0.012}, 1e-4);
+  down.direction = Direction::kDown;
+  machine().setPositionCompare("valve", down);
+  for (const double target : {0.02, 0.0, 0.011, 0.0105, 0.02, 0.0}) move(target);
+  expectTimes(switchedOn(0), timesAt(arrivals(), {800, 960}, 1));
+  expectTimes(switchedOn(1), timesAt(arrivals(), {800, 960}, -1));
+  EXPECT_EQ(switchedOn(0).size(), 4U);
+  EXPECT_EQ(switchedOn(1).size(), 4U);
+}
+
+TEST_F(PositionCompareTest, CamsAreOnBetweenTheirPlacesWhereverTheAxisTurns) {
+  PositionCompare cams = cam(0.01, 0.012);
+  cams.cams.push_back({0.02, 0.021});
+  machine().setPositionCompare("valve", cams);
+  for (const double target : {0.011, 0.005, 0.03, 0.0205, 0.0}) {
+    move(target);
+    const std::int64_t count = std::llround(target / kMicrostep);
+    const bool inside = (count >= 800 && count <= 960) || (count >= 1600 && count <= 1680);
+    EXPECT_EQ(shown(1).on, inside) << target;
+  }
+  std::vector<std::int64_t> times;
+  for (const Edge& edge : edges(1)) times.push_back(edge.time_ns);
+  std::vector<std::int64_t> wanted;
+  bool was_inside = false;
+  for (const Arrival& arrival : arrivals()) {
+    const bool inside = (arrival.count >= 800 && arrival.count <= 960) ||
+                        (arrival.count >= 1600 && arrival.count <= 1680);
+    if (std::exchange(was_inside, inside) != inside) wanted.push_back(arrival.time_ns);
+  }
+  EXPECT_EQ(wanted.size(), 10U);
+  expectTimes(times, wanted);
+}
+
+TEST_F(PositionCompareTest, AnAxisThatStandsInACamHasItsOutputOnAtOnce) {
+  move(0.011);
+  machine().setPositionCompare("valve", cam(0.01, 0.012));
+  advance(0.01);
+  EXPECT_TRUE(shown(1).on);
+  machine().clearPositionCompare("valve");
+  advance(0.01);
+  EXPECT_FALSE(shown(1).on);
+  machine().setOutput("valve", true);
+}
+
+TEST_F(PositionCompareTest, LeadsComeEarlierByTheirTimes) {
+  PositionCompare early = cam(0.02, 0.04);
+  early.lead_on_ns = 20 * kMillisecond;
+  early.lead_off_ns = 5 * kMillisecond;
+  machine().setPositionCompare("valve", early);
+  PositionCompare camera = at({0.02, 0.03}, 1e-3);
+  camera.lead_on_ns = 3 * kMillisecond;
+  machine().setPositionCompare("camera", camera);
+  move(0.06);
+  const auto all = edges(1);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_NEAR(static_cast<double>(timesAt(arrivals(), {1600}).at(0) - all[0].time_ns), 20e6, 1.0);
+  EXPECT_NEAR(static_cast<double>(timesAt(arrivals(), {3201}).at(0) - all[1].time_ns), 5e6, 1.0);
+  const auto shots = switchedOn();
+  ASSERT_EQ(shots.size(), 2U);
+  EXPECT_NEAR(static_cast<double>(timesAt(arrivals(), {1600}).at(0) - shots[0]), 3e6, 1.0);
+  EXPECT_NEAR(static_cast<double>(timesAt(arrivals(), {2400}).at(0) - shots[1]), 3e6, 1.0);
+}
+
+// It slows down, or stops, between the lead and the place.
+TEST_F(PositionCompareTest, WhatALeadHasBegunIsUndoneIfThePlaceIsNotReached) {
+  PositionCompare early = cam(0.03, 0.05);
+  early.lead_on_ns = 100 * kMillisecond;
+  machine().setPositionCompare("valve", early);
+  const axis::Move first = bench->axis("x").moveTo(0.08);
+  while (!shown(1).on) advance(1e-4);
+  EXPECT_LT(bench->axis("x").state().position, 0.0201);
+  machine().setSpeedOverride(0.5);
+  advance(0.005);
+  EXPECT_TRUE(shown(1).on) << "the same passage, later";
+  bench->axis("x").stop();
+  bench->axis("x").wait(first);
+  advance(0.01);
+  ASSERT_LT(bench->axis("x").state().position, 0.03);
+  EXPECT_FALSE(shown(1).on);
+  ASSERT_EQ(edges(1).size(), 2U);
+  move(0.08);
+  EXPECT_EQ(edges(1).size(), 4U);
+}
+
+TEST_F(PositionCompareTest, TwoOutputsAtOnePlaceAreSwitchedAtOneNanosecond) {
+  machine().setPositionCompare("camera", at({0.01, 0.02}));
+  machine().setPositionCompare("valve", at({0.01, 0.02}));
+  move(0.03);
+  EXPECT_EQ(switchedOn(0), switchedOn(1));
+  EXPECT_EQ(switchedOn(0).size(), 2U);
+}
+
+TEST_F(PositionCompareTest, WithABacklashItIsTheJointThatArrives) {
+  axes[0].backlash = 20 * kMicrostep;
+  begin();
+  machine().setPositionCompare("camera", every(0.001, 0.0, 0.03, 1e-4));
+  for (const double target : {0.0105, 0.0102, 0.0108, 0.004, 0.0045, 0.02, 0.0}) move(target);
+  expectTimes(switchedOn(), timesAt(arrivals(20), multiples(80, 0, 2400)));
+  EXPECT_EQ(shown().missed, 0U);
+}
+
+TEST_F(PositionCompareTest, WithAShaperItIsTheShapedMotionThatArrives) {
+  axes[0].input_shaper = {{config::ShaperType::kMzv, 25.0, 0.1}};
+  axes[0].start_speed = 0.0;
+  begin();
+  machine().setPositionCompare("camera", every(0.001, 0.0, 0.03, 1e-4));
+  const axis::Move first = bench->axis("x").moveTo(0.03);
+  advance(0.15);
+  bench->axis("x").moveTo(0.005);
+  bench->axis("x").wait(first);
+  while (bench->axis("x").state().moving) advance(1e-3);
+  expectTimes(switchedOn(), timesAt(arrivals(), multiples(80, 0, 2400)));
+  EXPECT_GT(switchedOn().size(), 10U);
+}
+
+TEST_F(PositionCompareTest, OnACoreXyItIsTheAxisAndNotAMotor) {
+  axes = test::coreXyAxes();
+  begin();
+  machine().setPositionCompare("camera", every(0.001, 0.001, 0.03, 1e-4));
+  machine().setPositionCompare("valve", [] {
+    PositionCompare compare = every(0.001, 0.001, 0.03, 1e-4);
+    compare.axis = "y";
+    return compare;
+  }());
+  machine().wait(machine().moveLine({{"x", "y"}, {0.0203, 0.0102}, false, 0.0}));
+  // The motors step at 1.5 and 0.5 of the speed of x, so its place is known to two of their steps.
+  EXPECT_EQ(switchedOn(0).size(), 20U);
+  EXPECT_EQ(switchedOn(1).size(), 10U);
+  const auto a = arrivals(0, "x");
+  const auto b = arrivals(0, "y");
+  const auto count_at = [](const std::vector<Arrival>& all, std::int64_t time) {
+    std::int64_t count = 0;
+    for (const Arrival& one : all) {
+      if (one.time_ns <= time) count = one.count;
+    }
+    return static_cast<double>(count);
+  };
+  for (std::size_t i = 0; i < 20; ++i) {
+    const std::int64_t time = switchedOn(0)[i];
+    EXPECT_NEAR((count_at(a, time) + count_at(b, time)) / 2.0, 80.0 * (double(i) + 1.0) - 0.5, 1.0);
+  }
+  machine().wait(machine().moveLine({{"x", "y"}, {0.0, 0.0}, false, 0.0}));
+  EXPECT_EQ(switchedOn(0).size(), 40U);
+  EXPECT_EQ(shown(0).missed, 0U);
+}
+
+TEST_F(PositionCompareTest, AtTheEndOfAMotionButNotOfAHoldOrAStop) {
+  PositionCompare end;
+  end.axis = "x";
+  end.at_end = true;
+  end.pulse_ns = kMillisecond;
+  machine().setPositionCompare("camera", end);
+  const axis::Move first = bench->axis("x").moveTo(0.02);
+  advance(0.1);
+  machine().hold();
+  advance(1.0);
+  EXPECT_TRUE(switchedOn().empty());
+  machine().resume();
+  bench->axis("x").wait(first);
+  advance(0.01);
+  ASSERT_EQ(switchedOn().size(), 1U);
+  EXPECT_GE(switchedOn()[0], arrivals().back().time_ns);
+  // The last part of a step takes a while.
+  EXPECT_LT(switchedOn()[0], arrivals().back().time_ns + 3 * kMillisecond);
+  bench->axis("x").moveTo(0.0);
+  advance(0.1);
+  bench->axis("x").stop();
+  advance(1.0);
+  EXPECT_EQ(switchedOn().size(), 1U);
+}
+
+TEST_F(PositionCompareTest, APulseThatCannotBeMadeIsCounted) {
+  machine().setPositionCompare("camera", at({0.01}, 0.05));
+  // Over the place and back within the pulse.
+  move(0.01);
+  EXPECT_EQ(shown().compared, 1U);
+  move(0.01 + 2 * kMicrostep);
+  move(0.01);
+  advance(0.1);
+  EXPECT_EQ(timesAt(arrivals(), {800}).size(), 2U);
+  EXPECT_EQ(shown().compared + shown().missed, 2U);
+  EXPECT_EQ(shown().missed, 1U);
+  EXPECT_EQ(switchedOn().size(), 1U);
+}
+
+TEST_F(PositionCompareTest, AnEmergencyStopLeavesItSafeWithinAMillisecond) {
+  machine().setPositionCompare("camera", every(0.01, 0.01, 0.09, 0.05));
+  bench->axis("x").moveTo(0.1);
+  while (switchedOn().size() < 2) advance(1e-3);
+  EXPECT_TRUE(shown().on);
+  const std::int64_t asked = bench->clock.now();
+  machine().emergencyStop();
+  EXPECT_FALSE(shown().on);
+  ASSERT_EQ(edges().size(), 4U);
+  EXPECT_LE(edges()[3].time_ns - asked, kMillisecond);
+  advance(1.0);
+  EXPECT_EQ(edges().size(), 4U);
+  machine().recover();
+  move(0.06);
+  EXPECT_EQ(edges().size(), 4U) << "its position can't be trusted";
+  bench->axis("x").setPosition(0.0);
+  move(0.015);
+  EXPECT_EQ(edges().size(), 6U);
+}
+
+TEST_F(PositionCompareTest, AFaultOfAnotherAxisMakesItSafeAndTheMotionGoesOnUncompared) {
+  axes[1].driver = driver::driverChip("drv8825");
+  axes[1].fault = config::FaultPin{"y.fault"};
+  begin();
+  machine().setPositionCompare("camera", every(0.01, 0.01, 0.09, 0.05));
+  const axis::Move first = bench->axis("x").moveTo(0.1);
+  while (switchedOn().size() < 2) advance(1e-3);
+  bench->axis("y").moveTo(0.1);
+  sim::RigFaults over_current;
+  over_current.chip_fault_after = 10;
+  bench->rig.setFaults("y", over_current);
+  while (!bench->axis("x").result(first)) advance(1e-3);
+  EXPECT_NE(bench->axis("y").state().fault, "");
+  EXPECT_FALSE(shown().on);
+  EXPECT_LT(switchedOn().size(), 9U);
+  EXPECT_EQ(edges().size() % 2, 0U);
+}
+
+TEST_F(PositionCompareTest, ANewOriginAndANewModeMoveThePlaces) {
+  machine().setPositionCompare("camera", at({0.01}, 1e-4));
+  bench->axis("x").setPosition(0.005);
+  move(0.02);
+  expectTimes(switchedOn(), timesAt(arrivals(), {400}));
+  move(0.005);
+  bench->axis("x").setMicrosteps(8);
+  move(0.02);
+  ASSERT_EQ(switchedOn().size(), 3U);
+  EXPECT_EQ(shown().missed, 0U);
+}
+
+TEST_F(PositionCompareTest, WhatCannotBeMadeIsRefusedWithTheNumber) {
+  axes[0].min_position = 0.0;
+  axes[0].max_position = 0.1;
+  options.outputs[0].min_off_ns = 2 * kMillisecond;
+  options.outputs[1].at_stop = false;
+  begin();
+  const auto refused = [this](const PositionCompare& compare, const std::string& why,
+                              const std::string& output = "camera") {
+    EXPECT_REFUSED(machine().setPositionCompare(output, compare), why);
+  };
+  refused(at({0.05}), "there is no output pump (outputs: camera, valve)", "pump");
+  refused(at({0.05}), "the output valve has at_stop: off", "valve");
+  PositionCompare other = at({0.05});
+  other.axis = "q";
+  refused(other, "can't be switched by q: there is no such axis (axes: x, y)");
+  refused(at({}), "the output camera has neither cams nor places");
+  refused(at({0.11}), "has a place at 0.11 m, but the places of x are 0 m to 0.1 m");
+  refused(at({kNan}), "has a place at nan m");
+  refused(every(0.0, 0.0, 0.1), "has a distance of 0 m");
+  refused(every(kNan, 0.0, 0.1), "has a distance of nan m");
+  refused(every(0.01, 0.1, 0.0), "lead upwards");
+  refused(every(1e-9, 0.0, 0.1), "places, but can have 1000000 at most");
+  refused(every(1e-6, 0.0, 0.1, 1e-5), "a step of x is 1.25e-05 m");
+  // 0.2 mm take 2 ms at 100 mm/s.
+  refused(every(0.0002, 0.0, 0.1),
+          "takes 0.002 s at 0.1 m/s, but a pulse and min_off_ms of it "
+          "are 0.003 s");
+  refused(at({0.05}, 0.0), "has a pulse of 0 s, but it must be 1e-05 s to 10 s");
+  PositionCompare early = every(0.01, 0.0, 0.1);
+  early.lead_on_ns = 200 * kMillisecond;
+  refused(early, "but the lead is 0.2 s");
+  early.lead_on_ns = -1;
+  refused(early, "has a lead of on of");
+  PositionCompare cams = cam(0.05, 0.04);
+  refused(cams, "has a cam from 0.05 m to 0.04 m");
+  cams = cam(0.01, 0.02);
+  cams.cams.push_back({0.015, 0.03});
+  refused(cams, "has cams that overlap, to 0.02 m and from 0.015 m");
+  cams.places = {0.01};
+  refused(cams, "has cams and pulses");
+  bench->axis("x").moveTo(0.1);
+  refused(at({0.05}), "x: busy: it moves");
+  while (bench->axis("x").state().moving) advance(1e-2);
+  EXPECT_TRUE(edges().empty());
+}
+
+TEST_F(PositionCompareTest, NothingElseSwitchesItMeanwhile) {
+  machine().setPositionCompare("camera", at({0.01}));
+  EXPECT_REFUSED(machine().setOutput("camera", true),
+                 "the output camera: the position of x switches it");
+  test::PathRequest request{{"x"}, {}, false, 0.0, 0.0};
+  request.segments = {test::lineTo({0.01})};
+  request.segments[0].outputs = {{"camera", true}};
+  EXPECT_REFUSED(followPath(request), "the output camera: the position of x switches it");
+  machine().clearPositionCompare("camera");
+  machine().setOutput("camera", true);
+  EXPECT_TRUE(shown().on);
+}
+
+TEST_F(PositionCompareTest, AHundredThousandPlacesCostNoTime) {
+  axes[0].steps_per_unit = 8e6;
+  axes[0].max_speed = 1e-3;
+  axes[0].start_speed = 0.0;
+  axes[0].min_position = -1.0;
+  begin();
+  machine().setPositionCompare("camera", every(1e-6, 0.0, 0.1, 1e-5));
+  move(1e-3);
+  EXPECT_EQ(shown().compared, 1000U) << "the first place is where it stands";
+  EXPECT_EQ(shown().missed, 0U);
+}
+
+// ---- random motions ----
+
+class RandomPositionCompare : public PositionCompareTest, public testing::WithParamInterface<int> {
+ protected:
+  double unit() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
+  std::int64_t whole(std::int64_t least, std::int64_t most) {
+    return std::uniform_int_distribution<std::int64_t>(least, most)(random_);
+  }
+  bool chance(double probability) { return unit() < probability; }
+
+  void draw() {
+    axes[0] = plotterAxis("x");
+    play_ = chance(0.5) ? whole(1, 40) : 0;
+    axes[0].backlash = static_cast<double>(play_) * kMicrostep;
+    axes[0].jerk = chance(0.4) ? 5.0 + 30.0 * unit() : 0.0;
+    if (axes[0].jerk > 0.0) axes[0].start_speed = 0.0;
+    if (play_ == 0 && chance(0.4)) {
+      axes[0].start_speed = 0.0;
+      axes[0].input_shaper = {{config::ShaperType::kZv, 20.0 + 60.0 * unit(), 0.1}};
+    }
+    begin();
+    counts_.clear();
+    std::int64_t count = -whole(0, 4000);
+    const std::int64_t last = whole(500, 5000);
+    while (count < last) {
+      counts_.push_back(count);
+      count += chance(0.5) ? 12 + whole(0, 8) : whole(20, 800);
+    }
+    direction_ = static_cast<int>(whole(-1, 1));
+    pulse_ = whole(10'000, 100'000);
+    PositionCompare compare;
+    compare.axis = "x";
+    compare.direction = direction_ == 0  ? Direction::kBoth
+                        : direction_ > 0 ? Direction::kUp
+                                         : Direction::kDown;
+    for (const std::int64_t place : counts_) {
+      compare.places.push_back(static_cast<double>(place) * kMicrostep);
+    }
+    compare.pulse_ns = pulse_;
+    machine().setPositionCompare("camera", compare);
+    PositionCompare cams;
+    cams.axis = "x";
+    cam_from_ = whole(-2000, 1000);
+    cam_to_ = cam_from_ + whole(1, 2000);
+    cams.cams = {
+        {static_cast<double>(cam_from_) * kMicrostep, static_cast<double>(cam_to_) * kMicrostep}};
+    machine().setPositionCompare("valve", cams);
+    advance(0.001);
+  }
+
+  void disturb() {
+    axis::Axis& x = bench->axis("x");
+    const double what = unit();
+    if (what < 0.45) {
+      x.moveTo(-0.04 + 0.09 * unit(), false, chance(0.5) ? 0.0 : 0.02 + 0.08 * unit());
+    } else if (what < 0.55) {
+      x.moveTo(static_cast<double>(counts_[static_cast<std::size_t>(
+                   whole(0, static_cast<std::int64_t>(counts_.size()) - 1))]) *
+               kMicrostep);
+    } else if (what < 0.65) {
+      x.jog(-0.1 + 0.2 * unit());
+    } else if (what < 0.75) {
+      machine().setSpeedOverride(0.1 + 0.9 * unit());
+    } else if (what < 0.9) {
+      machine().hold();
+      if (chance(0.7)) advance(0.2 * unit());
+      machine().resume();
+    } else {
+      x.stop();
+    }
+    ++motions_;
+  }
+
+  // What the trace says that the camera should have done.
+  void judge() {
+    const auto all = arrivals(play_);
+    std::vector<std::int64_t> on;
+    std::uint64_t missed = 0;
+    std::int64_t off = std::numeric_limits<std::int64_t>::min();
+    bool inside = cam_from_ <= 0 && 0 <= cam_to_;
+    std::vector<std::int64_t> valve;
+    for (const Arrival& arrival : all) {
+      const bool is_place = std::binary_search(counts_.begin(), counts_.end(), arrival.count) &&
+                            (direction_ == 0 || direction_ == arrival.direction);
+      if (is_place && arrival.time_ns <= off) ++missed;
+      if (is_place && arrival.time_ns > off) {
+        on.push_back(arrival.time_ns);
+        off = arrival.time_ns + pulse_;
+      }
+      const bool is_inside = arrival.count >= cam_from_ && arrival.count <= cam_to_;
+      if (std::exchange(inside, is_inside) != is_inside) valve.push_back(arrival.time_ns);
+    }
+    expectTimes(switchedOn(), on);
+    ASSERT_EQ(shown().compared, on.size());
+    ASSERT_EQ(shown().missed, missed);
+    const auto of_valve = edges(1);
+    const bool first = cam_from_ <= 0 && 0 <= cam_to_;
+    ASSERT_EQ(of_valve.size(), valve.size() + (first ? 1 : 0));
+    for (std::size_t i = 0; i < valve.size(); ++i) {
+      ASSERT_LE(std::abs(of_valve[i + (first ? 1 : 0)].time_ns - valve[i]), 1) << i;
+    }
+    marks_ += static_cast<int>(on.size() + valve.size());
+  }
+
+  std::mt19937 random_;
+  std::int64_t play_ = 0;
+  std::vector<std::int64_t> counts_;
+  int direction_ = 0;
+  std::int64_t pulse_ = 0;
+  std::int64_t cam_from_ = 0;
+  std::int64_t cam_to_ = 0;
+  int motions_ = 0;
+  int marks_ = 0;
+};
+
+TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
+  for (int run = 0; run < 50; ++run) {
+    const int number = GetParam() * 1000 + run;
+    SCOPED_TRACE(number);
+    random_.seed(static_cast<unsigned>(number));
+    ASSERT_NO_FATAL_FAILURE(draw());
+    for (int i = 0; i < 20; ++i) {
+      test::refusal([this] { disturb(); });
+      advance(0.4 * unit());
+    }
+    const bool emergency = chance(0.3);
+    if (emergency) {
+      machine().emergencyStop();
+    } else {
+      test::refusal([this] { machine().stop(); });
+    }
+    const std::int64_t asked = bench->clock.now();
+    advance(1.0);
+    if (emergency) {
+      for (std::size_t output : {0U, 1U}) {
+        EXPECT_FALSE(shown(output).on);
+        // Only to the safe state.
+        const auto all = edges(output);
+        if (all.empty() || all.back().time_ns < asked) continue;
+        EXPECT_LE(all.back().time_ns - asked, kMillisecond);
+      }
+      continue;
+    }
+    judge();
+    if (HasFatalFailure()) return;
+  }
+  RecordProperty("motions", motions_);
+  RecordProperty("marks", marks_);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomPositionCompare, testing::Range(0, 10));
+
+}  // namespace
+}  // namespace stepdriver
