@@ -4,7 +4,10 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/IoStates.h>
+#include <stepdriver/MoveTo.h>
 #include <stepdriver/SetOutput.h>
+#include <stepdriver/SetPosition.h>
+#include <stepdriver/SetPositionCompare.h>
 
 #include <algorithm>
 #include <string>
@@ -74,6 +77,42 @@ TEST_F(NamedLines, AreSwitchedByAServiceAndShownByALatchedTopic) {
     return !now.input_active.at(0) && now.input_changed.at(0) > ros::Time(0);
   }));
   EXPECT_LE(states.count() - before, 2U) << "bounces are no changes";
+}
+
+TEST_F(NamedLines, AreSwitchedByThePositionOfAnAxis) {
+  node.start();
+  const Recorder<IoStates> states(node.full("io_states"));
+  SetPosition::Request zero;
+  EXPECT_TRUE(node.call<SetPosition>("x/set_position", zero).success);
+  SetPositionCompare::Request compare;
+  compare.output = "pen";
+  compare.axis = "x";
+  compare.distance = 0.002;
+  compare.begin = 0.002;
+  compare.end = 0.02;
+  compare.pulse = 0.001;
+  const auto answer = node.call<SetPositionCompare>("set_position_compare", compare);
+  ASSERT_TRUE(answer.success) << answer.message;
+  EXPECT_EQ(answer.message, "the position of x switches pen");
+  EXPECT_FALSE(set("pen", true).success);
+  MoveTo::Request move;
+  move.position = 0.025;
+  move.wait = true;
+  EXPECT_TRUE(node.call<MoveTo>("x/move_to", move).success);
+  EXPECT_TRUE(states.waitForLatest([](const IoStates& now) {
+    return now.output_axis == std::vector<std::string>{"x", ""} &&
+           now.output_compared.at(0) == 10 && now.output_missed.at(0) == 0;
+  }));
+  compare.pulse = -1.0;
+  EXPECT_EQ(node.call<SetPositionCompare>("set_position_compare", compare).message,
+            "pulse is -1 s, but must be 0 to 10 s");
+  compare.direction = 2;
+  EXPECT_NE(
+      node.call<SetPositionCompare>("set_position_compare", compare).message.find("direction"),
+      std::string::npos);
+  compare.axis.clear();
+  EXPECT_TRUE(node.call<SetPositionCompare>("set_position_compare", compare).success);
+  EXPECT_TRUE(set("pen", true).success);
 }
 
 TEST_F(NamedLines, AreSafeAfterAnEmergencyStopAndRefusedUntilRecover) {

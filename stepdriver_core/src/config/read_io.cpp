@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
+#include "config/position_compare.h"
 #include "config/read_axes.h"
 #include "config/write_axes.h"
+#include "message_text.h"
 #include "printable.h"
 
 namespace stepdriver::config {
@@ -57,6 +60,106 @@ void checkMostOn(ConfigReader& reader, const OutputConfig& output) {
   }
 }
 
+std::int64_t readTime(ConfigReader& reader, const char* key) {
+  constexpr Range kTimesMs{0.0, 10'000.0};
+  return readMilliseconds(reader, key, kTimesMs);
+}
+
+/// What the position of an axis makes an output do, in the units of the axis.
+class CompareReader {
+ public:
+  CompareReader(ConfigReader& reader, const AxisConfig& axis)
+      : reader_(reader),
+        unit_(axis.kind == Kind::kLinear ? "_mm" : "_deg"),
+        scale_(1.0 / configUnitsPerUnit(axis.kind)) {}
+
+  void read(PositionCompare& compare) {
+    using Direction = PositionCompare::Direction;
+    const std::string direction = reader_.oneOf("direction", {"both", "up", "down"}, "both");
+    if (direction != "both")
+      compare.direction = direction == "up" ? Direction::kUp : Direction::kDown;
+    const std::string distance = "every" + unit_;
+    if (reader_.has(distance)) {
+      const auto number = [this](const std::string& key) {
+        return scale_ * reader_.number(key + unit_, kPlaces);
+      };
+      compare.every = PositionCompare::Every{number("every"), number("from"), number("to")};
+    }
+    compare.places = numbers("places" + unit_, list("places" + unit_));
+    for (const ConfigValue& cam : list("cams" + unit_)) {
+      const auto* ends = cam.as<ConfigValue::List>();
+      const std::vector<double> places =
+          ends != nullptr ? numbers("cams" + unit_, *ends) : std::vector<double>{};
+      if (places.size() == 2) {
+        compare.cams.push_back({places[0], places[1]});
+      } else {
+        reader_.issue("cams" + unit_, fmt::format("has {}, but each cam must be a list of two "
+                                                  "places, where it begins and ends",
+                                                  cam.shown()));
+      }
+    }
+    compare.at_end = reader_.boolean("at_end", false);
+    compare.pulse_ns = readTime(reader_, "pulse_ms");
+    compare.lead_on_ns = readTime(reader_, "lead_on_ms");
+    compare.lead_off_ns = readTime(reader_, "lead_off_ms");
+  }
+
+ private:
+  static constexpr Range kPlaces{-1e12, 1e12};
+
+  ConfigValue::List list(const std::string& key) {
+    reader_.allow(key);
+    if (!reader_.has(key)) return {};
+    if (const auto* list = reader_.value(key).as<ConfigValue::List>()) return *list;
+    reader_.issue(key, fmt::format("is {}, but must be a list", reader_.shown(key)));
+    return {};
+  }
+
+  std::vector<double> numbers(const std::string& key, const ConfigValue::List& list) {
+    std::vector<double> found;
+    for (const ConfigValue& value : list) {
+      const int* integer = value.as<int>();
+      const double* real = value.as<double>();
+      const double number = integer != nullptr ? *integer : real != nullptr ? *real : std::nan("");
+      if (kPlaces.holds(number)) {
+        found.push_back(scale_ * number);
+      } else {
+        reader_.issue(key, fmt::format("has {}, but must have places only", value.shown()));
+      }
+    }
+    return found;
+  }
+
+  ConfigReader& reader_;
+  const std::string unit_;
+  const double scale_;
+};
+
+const AxisConfig* axisNamed(const std::vector<AxisConfig>& axes, const std::string& name) {
+  const auto found = std::find_if(axes.begin(), axes.end(),
+                                  [&](const AxisConfig& axis) { return axis.name == name; });
+  return found != axes.end() ? &*found : nullptr;
+}
+
+void readCompare(ConfigReader compare, OutputConfig& output, const std::vector<AxisConfig>& axes) {
+  const auto name = compare.findText("axis", Presence::kRequired);
+  if (!name) return;
+  const AxisConfig* axis = axisNamed(axes, *name);
+  if (axis == nullptr) {
+    return compare.issue(
+        "axis", fmt::format("is \"{}\", but the axes are {}", printable(*name),
+                            joinedText(axes, [](const AxisConfig& any) { return any.name; })));
+  }
+  output.compare.emplace();
+  output.compare->axis = *name;
+  const std::size_t issues = compare.issues().size();
+  CompareReader(compare, *axis).read(*output.compare);
+  compare.rejectUnknown();
+  if (compare.issues().size() != issues) return;
+  const std::string why = whyNotCompared(*output.compare, output, *axis);
+  if (!why.empty()) compare.issue("", why);
+}
+
 OutputConfig readOutput(ConfigReader& reader, UsedLines& used) {
   OutputConfig output;
   output.line = readRequiredLine(reader, "pin", used);
@@ -81,9 +184,9 @@ InputConfig readInput(ConfigReader& reader, UsedLines& used) {
 }
 
 /// @param what "an output"
-template <typename Config>
+template <typename Config, typename Read>
 std::vector<Config> readNamed(ConfigReader& machine, const char* key, const char* what,
-                              UsedLines& used, Config (*read)(ConfigReader&, UsedLines&)) {
+                              UsedLines& used, const Read& read) {
   ConfigReader all = machine.map(key);
   std::vector<Config> configs;
   for (const std::string& name : all.keys()) {
@@ -106,12 +209,37 @@ double millisecondsOf(std::int64_t nanoseconds) { return static_cast<double>(nan
 
 }  // namespace
 
-std::vector<OutputConfig> readOutputs(ConfigReader& machine, UsedLines& used) {
-  return readNamed(machine, "outputs", "an output", used, readOutput);
+std::vector<OutputConfig> readOutputs(ConfigReader& machine, UsedLines& used,
+                                      const std::vector<AxisConfig>* axes) {
+  return readNamed<OutputConfig>(machine, "outputs", "an output", used,
+                                 [axes](ConfigReader& reader, UsedLines& lines) {
+                                   OutputConfig output = readOutput(reader, lines);
+                                   reader.allow("position_compare");
+                                   if (axes != nullptr && reader.has("position_compare")) {
+                                     readCompare(reader.map("position_compare"), output, *axes);
+                                   }
+                                   return output;
+                                 });
+}
+
+void checkCompares(const std::vector<OutputConfig>& outputs, const std::vector<AxisConfig>& axes,
+                   std::vector<ConfigIssue>& issues) {
+  for (const OutputConfig& output : outputs) {
+    if (!output.compare) continue;
+    const std::string name = fmt::format("outputs/{}/position_compare", printable(output.name));
+    const AxisConfig* axis = axisNamed(axes, output.compare->axis);
+    if (axis == nullptr) {
+      issues.push_back({name + "/axis", fmt::format("is \"{}\", but there is no such axis",
+                                                    printable(output.compare->axis))});
+    } else if (const std::string why = whyNotCompared(*output.compare, output, *axis);
+               !why.empty()) {
+      issues.push_back({name, why});
+    }
+  }
 }
 
 std::vector<InputConfig> readInputs(ConfigReader& machine, UsedLines& used) {
-  return readNamed(machine, "inputs", "an input", used, readInput);
+  return readNamed<InputConfig>(machine, "inputs", "an input", used, readInput);
 }
 
 ConfigValue::Map writeOutputs(const std::vector<OutputConfig>& outputs) {

@@ -66,6 +66,15 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
     }
     axis->shareMotors(sharing);
   }
+  const std::vector<config::OutputConfig> outputs = requests_.named.outputs.configs();
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (!outputs[i].compare) continue;
+    const auto axis = std::find_if(axes.begin(), axes.end(), [&](const config::AxisConfig& any) {
+      return any.name == outputs[i].compare->axis;
+    });
+    context_.motion_outputs.compare(i, outputs[i].compare,
+                                    static_cast<std::size_t>(axis - axes.begin()), nullptr);
+  }
 }
 
 Controller::~Controller() { context_.out = &last_; }

@@ -116,7 +116,8 @@ void checkOptions(const std::vector<config::AxisConfig>* axes, const MachineOpti
   read.heartbeat = readHeartbeat(reader, used);
   checkNames(options.outputs, "outputs", issues);
   checkNames(options.inputs, "inputs", issues);
-  config::readOutputs(reader, used);
+  config::readOutputs(reader, used, nullptr);
+  if (axes != nullptr) config::checkCompares(options.outputs, *axes, issues);
   config::readInputs(reader, used);
 }
 

@@ -109,7 +109,7 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
                              config.motor_power.has_value(), config.emergency_disable,
                              config.emergency_stop, used);
   config.heartbeat = machine::readHeartbeat(reader, used);
-  config.outputs = config::readOutputs(reader, used);
+  config.outputs = config::readOutputs(reader, used, axes_are_right ? &config.axes : nullptr);
   config.inputs = config::readInputs(reader, used);
   config::checkHomingInputs(config.axes, config.inputs, reader.fullName("axes"), reader.issues());
   ConfigReader simulation = reader.map("simulation");

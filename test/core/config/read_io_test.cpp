@@ -24,9 +24,21 @@ struct Read {
   explicit Read(const ConfigValue& machine) {
     ConfigReader reader(machine, "", issues);
     UsedLines used(issues);
-    outputs = readOutputs(reader, used);
+    outputs = readOutputs(reader, used, &axes);
     inputs = readInputs(reader, used);
   }
+  static std::vector<AxisConfig> twoAxes() {
+    std::vector<AxisConfig> both(2);
+    both[0].name = "x";
+    both[1].name = "turn";
+    both[1].kind = Kind::kRotary;
+    for (AxisConfig& axis : both) {
+      axis.steps_per_unit = 80'000.0;
+      axis.max_speed = 0.1;
+    }
+    return both;
+  }
+  const std::vector<AxisConfig> axes = twoAxes();
   std::vector<ConfigIssue> issues;
   std::vector<OutputConfig> outputs;
   std::vector<InputConfig> inputs;
@@ -35,6 +47,56 @@ struct Read {
 std::string issueOf(const std::string& path, ConfigValue value) {
   const Lines lines = linesOf(Read(machineWith(path, std::move(value))).issues);
   return lines.size() == 1 ? lines.front() : std::to_string(lines.size()) + " issues";
+}
+
+ConfigValue compareWith(const std::string& axis, const std::string& key, ConfigValue value) {
+  ConfigValue machine = machineWith("outputs/pen/position_compare/axis", axis);
+  put(machine, "outputs/pen/position_compare/pulse_ms", 1.0);
+  put(machine, "outputs/pen/position_compare/" + key, std::move(value));
+  return machine;
+}
+
+TEST(ReadIo, ReadsWhatAPositionSwitchesInTheUnitsOfItsAxis) {
+  using List = ConfigValue::List;
+  const Read places(compareWith("x", "places_mm", List{1.0, 2, 30.5}));
+  EXPECT_EQ(linesOf(places.issues), Lines());
+  EXPECT_EQ(places.outputs.front().compare->places, (std::vector<double>{0.001, 0.002, 0.0305}));
+  EXPECT_EQ(places.outputs.front().compare->pulse_ns, 1'000'000);
+  const Read cams(compareWith("turn", "cams_deg", List{List{0.0, 90.0}, List{100.0, 180}}));
+  EXPECT_EQ(linesOf(cams.issues), Lines());
+  ASSERT_EQ(cams.outputs.front().compare->cams.size(), 2U);
+  EXPECT_NEAR(cams.outputs.front().compare->cams[1].to, 3.14159265, 1e-8);
+  ConfigValue every = compareWith("x", "every_mm", 2.0);
+  put(every, "outputs/pen/position_compare/from_mm", 0.0);
+  put(every, "outputs/pen/position_compare/to_mm", 100.0);
+  put(every, "outputs/pen/position_compare/direction", std::string("up"));
+  const Read each(every);
+  EXPECT_EQ(linesOf(each.issues), Lines());
+  EXPECT_EQ(each.outputs.front().compare->every->distance, 0.002);
+  EXPECT_EQ(each.outputs.front().compare->direction, PositionCompare::Direction::kUp);
+}
+
+TEST(ReadIo, RefusesWhatAPositionCantSwitch) {
+  using List = ConfigValue::List;
+  const auto issue = [](const ConfigValue& machine) {
+    const Lines lines = linesOf(Read(machine).issues);
+    return lines.empty() ? "" : lines.front();
+  };
+  EXPECT_EQ(issue(compareWith("q", "at_end", true)),
+            "outputs/pen/position_compare/axis: is \"q\", but the axes are x, turn");
+  EXPECT_EQ(issue(compareWith("x", "places_deg", List{1.0})),
+            "outputs/pen/position_compare/places_deg: is not a known parameter; did you mean "
+            "places_mm?");
+  EXPECT_EQ(issue(compareWith("x", "places_mm", 1.0)),
+            "outputs/pen/position_compare/places_mm: is 1.0, but must be a list");
+  EXPECT_EQ(issue(compareWith("x", "places_mm", List{std::string("here")})),
+            "outputs/pen/position_compare/places_mm: has \"here\", but must have places only");
+  EXPECT_EQ(issue(compareWith("x", "cams_mm", List{List{1.0}})),
+            "outputs/pen/position_compare/cams_mm: has [1.0], but each cam must be a list of two "
+            "places, where it begins and ends");
+  EXPECT_EQ(issue(compareWith("x", "places_mm", List{1.0, 1.05})),
+            "outputs/pen/position_compare: has a distance between pulses of 5e-05 m, for which x "
+            "takes 0.0005 s at 0.1 m/s, but a pulse and min_off_ms of it are 0.001 s");
 }
 
 TEST(ReadIo, HasDefaultsThatSwitchNothing) {

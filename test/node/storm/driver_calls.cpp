@@ -18,6 +18,7 @@
 #include <stepdriver/PathSegment.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
+#include <stepdriver/SetPositionCompare.h>
 #include <stepdriver/SpeedOverride.h>
 #include <trajectory_msgs/JointTrajectory.h>
 
@@ -395,6 +396,18 @@ bool DriverCalls::setPosition(std::size_t axis, double position) {
   const std::string name = kAxisNames.at(axis) + "/set_position";
   return call(requestOf(Kind::kSetPosition, 1U << axis, name + " " + shown(position)), name,
               service);
+}
+
+bool DriverCalls::compare(std::size_t axis, double from, double to) {
+  SetPositionCompare service;
+  service.request.output = kOutput;
+  service.request.axis = kAxisNames.at(axis);
+  service.request.cam_begin = {from};
+  service.request.cam_end = {to};
+  return call(requestOf(Kind::kOther, 0,
+                        "set_position_compare " + kAxisNames.at(axis) + " " + shown(from) + " " +
+                            shown(to)),
+              "set_position_compare", service);
 }
 
 bool DriverCalls::speedOverride(double factor) {

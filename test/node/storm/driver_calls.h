@@ -83,6 +83,8 @@ class DriverCalls {
   bool microstep(std::size_t axis, int microsteps);
   bool setLimits(std::size_t axis, double max_speed, double acceleration, double jerk);
   bool setPosition(std::size_t axis, double position);
+  /// The position of an axis switches the output kOutput: it is on between two places.
+  bool compare(std::size_t axis, double from, double to);
   bool speedOverride(double factor);
   /// Calls of std_srvs/SetBool for an axis: enable, sleep; press_min and press_max of the rig.
   bool set(Kind kind, std::size_t axis, const std::string& service, bool data);
@@ -104,5 +106,6 @@ class DriverCalls {
 
 extern const std::vector<std::string> kAxisNames;
 constexpr AxisSet kAllAxes = 7;
+constexpr const char* kOutput = "tool";
 
 }  // namespace stepdriver::storm

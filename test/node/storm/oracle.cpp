@@ -103,6 +103,7 @@ class Judge {
       judgeReason(request);
       if (!request.answered || !request.success) continue;
       judgeArrivals(request);
+      if (request.kind == Kind::kEmergencyStop) judgeOutput(request);
       if (!ends(request.kind)) continue;
       for (std::size_t axis = 0; axis < seen_.axes.size(); ++axis) {
         if (isOf(request, axis)) judgeEnd(request, axis);
@@ -299,6 +300,24 @@ class Judge {
         formatted("%.3f s", inSeconds(allowed)) + " are allowed); " +
         courseAround(answered, axis, last) +
         "; requests before and after it:" + requestsAround(ending.sent, clock_.whenItShows(first)));
+  }
+
+  void judgeOutput(const Request& stop) {
+    const std::int64_t begin = clock_.latestAt(*stop.answered);
+    std::int64_t end = kForever;
+    for (auto request = firstAfter(stop); request != seen_.requests.end(); ++request) {
+      if (request->kind != Kind::kRecover || wasRefused(*request)) continue;
+      if (mayFollow(*request, stop)) end = std::min(end, clock_.earliestAt(request->sent));
+    }
+    const auto later =
+        std::upper_bound(seen_.switches.begin(), seen_.switches.end(), begin,
+                         [](std::int64_t time, const Switch& each) { return time < each.time; });
+    const bool was_on = later != seen_.switches.begin() && (later - 1)->on;
+    const std::int64_t next = later != seen_.switches.end() ? later->time : kForever;
+    const std::int64_t on_since = was_on ? begin : next;
+    if (on_since >= end) return;
+    broken_.push_back("the output was on after the answer of " + stop.text + ", since " +
+                      formatted("%.3f s", inSeconds(on_since - begin)) + " after it");
   }
 
   std::string requestsAround(std::int64_t begin, std::int64_t end) const {

@@ -25,6 +25,12 @@ struct Pulse {
   std::int64_t count = 0;  ///< [1/16 steps] forward less backward, with this pulse
 };
 
+/// A change of the output that a position switches.
+struct Switch {
+  std::int64_t time = 0;  ///< [ns] on the rig's clock
+  bool on = false;
+};
+
 /// A moment at which every axis was at rest, and what the node said then.
 struct RestPoint {
   std::int64_t time = 0;          ///< [ns] of CLOCK_MONOTONIC
@@ -42,6 +48,7 @@ struct Observation {
   std::vector<AxisFacts> axes;
   std::vector<Request> requests;
   std::vector<std::vector<Pulse>> pulses;  ///< those of each axis
+  std::vector<Switch> switches;            ///< from off on, in their order
   std::vector<RestPoint> rests;
   std::vector<Stall> stalls;
   std::vector<ClockReading> clock;  ///< what the rig's clock showed
@@ -53,6 +60,8 @@ struct Observation {
 ///   answer of a stop or a hold there are none later than the longest deceleration and 10 %. This
 ///   ends when a newer motion can have begun: one that was requested later and that nothing forbids
 ///   any longer.
+/// - From the answer of an emergency stop until a newer recover can have come, the output that a
+///   position switches is off.
 /// - If an answer says that a position was reached, it was reached.
 /// - The reported position is the count of the pulses.
 /// - Pulses never lead an axis beyond its soft limits. If only one request for motion comes between

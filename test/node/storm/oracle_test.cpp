@@ -71,6 +71,7 @@ class OneAxis {
       reading.rig = (begin - kOffset) * kMs;
     }
   }
+  void switchOutput(std::int64_t time, bool on) { seen_.switches.push_back({time * kMs, on}); }
   std::size_t broken() const { return brokenPromises(seen_).size(); }
 
  private:
@@ -97,6 +98,21 @@ TEST(Oracle, LetsNoPulseFollowADisableOrAnEmergencyStop) {
   for (const Kind kind : {Kind::kDisable, Kind::kSleep, Kind::kEmergencyStop}) {
     EXPECT_EQ(endedBy(kind, 2010).broken(), 0U);
     EXPECT_EQ(endedBy(kind, 2015).broken(), 1U);
+  }
+}
+
+TEST(Oracle, LetsNoOutputBeOnFromAnEmergencyStopToTheNextRecover) {
+  for (const std::int64_t off : {2005, 2015}) {
+    OneAxis axis = endedBy(Kind::kEmergencyStop, 2000);
+    axis.switchOutput(1500, true);
+    axis.switchOutput(off, false);
+    EXPECT_EQ(axis.broken(), off < 2010 ? 0U : 1U) << off;
+  }
+  for (const std::int64_t on : {2500, 3200}) {
+    OneAxis axis = endedBy(Kind::kEmergencyStop, 2000);
+    axis.ask(requestOf(Kind::kRecover, 4000, 4010));
+    axis.switchOutput(on, true);
+    EXPECT_EQ(axis.broken(), on > 3000 ? 0U : 1U) << on;
   }
 }
 

@@ -125,7 +125,10 @@ void StormClient::sendSetting() {
     };
     calls_.setLimits(axis, or_configured(0.01, 0.04), or_configured(0.02, 0.2),
                      or_configured(0.05, 3.0));
-  } else if (what < 0.7) {
+  } else if (what < 0.62) {
+    const double from = anyPosition();
+    calls_.compare(axis, from, from + between(0.001, 0.02));
+  } else if (what < 0.72) {
     calls_.setPosition(axis, anyPosition());
   } else if (what < 0.85) {
     calls_.microstep(chance(0.5) ? 0 : 2, chance(0.5) ? 16 : 8);

@@ -2,6 +2,8 @@
 
 #include <initializer_list>
 
+#include "storm/driver_calls.h"
+
 namespace stepdriver::storm {
 namespace {
 
@@ -51,6 +53,7 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node) {
   node.set("motor_power/off_delay_ms", 50.0);
   node.set("motor_power/feedback/pin", "motor_power_feedback");
   node.set("motor_power/feedback/active_level", "high");
+  node.set(std::string("outputs/") + kOutput + "/pin", kOutput);
   const auto pins = {"step", "dir", "ms1", "ms2", "ms3", "sleep", "reset"};
   std::vector<AxisFacts> facts;
   facts.push_back(setUpAxis(node, "x", pins, {100.0, 250.0, 0.0}));

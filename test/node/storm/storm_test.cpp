@@ -18,6 +18,7 @@
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "storm/driver_calls.h"
@@ -280,16 +281,22 @@ void Storm::end() {
 void Storm::judge() {
   const auto trace = node_test::readVcd(trace_);
   for (const AxisFacts& axis : seen_.axes) seen_.pulses.push_back(pulsesOf(trace, axis.name));
+  bool on = false;
+  for (const auto& edge : trace.at(std::string("outputs/") + kOutput).edges) {
+    if (std::exchange(on, edge.level) != edge.level) seen_.switches.push_back({edge.time_ns, on});
+  }
   seen_.requests = log_.requests();
   seen_.stalls = stall_watch_.stalls();
   std::size_t pulses = 0;
   for (const auto& each : seen_.pulses) pulses += each.size();
   std::printf(
-      "storm: seed %llu, %zu requests, %zu pulses, %zu calms, %zu stalls, %zu readings of the "
+      "storm: seed %llu, %zu requests, %zu pulses, %zu switches, %zu calms, %zu stalls, %zu "
+      "readings of the "
       "rig's "
       "clock, %.1f to %.1f MB\n",
-      static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, seen_.rests.size(),
-      seen_.stalls.size(), seen_.clock.size(), *std::min_element(memory_.begin(), memory_.end()),
+      static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, seen_.switches.size(),
+      seen_.rests.size(), seen_.stalls.size(), seen_.clock.size(),
+      *std::min_element(memory_.begin(), memory_.end()),
       *std::max_element(memory_.begin(), memory_.end()));
   const auto broken = brokenPromises(seen_);
   for (std::size_t i = 0; i < std::min(broken.size(), kMostReported); ++i) fail(broken[i]);

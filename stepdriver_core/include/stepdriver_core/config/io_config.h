@@ -69,6 +69,8 @@ struct OutputConfig {
   /// [ns] How long it stays on, or off, at least. The safe state doesn't wait for that.
   std::int64_t min_on_ns = 0;
   std::int64_t min_off_ns = 0;
+  /// From the start on, until Machine::setPositionCompare() or clearPositionCompare().
+  std::optional<PositionCompare> compare{};
 
   bool level(bool on) const { return on == active_level; }
 };

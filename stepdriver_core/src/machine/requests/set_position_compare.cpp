@@ -6,8 +6,8 @@
 
 #include "config/position_compare.h"
 #include "message_text.h"
+#include "printable.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/printable.h"
 
 namespace stepdriver::machine {
 
