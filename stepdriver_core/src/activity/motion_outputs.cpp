@@ -99,9 +99,9 @@ std::optional<bool> MotionOutputs::takeWanted(std::size_t output) {
 // ---- the position of an axis ----
 
 const std::string& MotionOutputs::comparedAxis(std::size_t output) const {
-  static const std::string kNone;
+  static const std::string none;
   const auto& compared = outputs_[output].compared;
-  return compared ? compared->compare.axis : kNone;
+  return compared ? compared->compare.axis : none;
 }
 
 void MotionOutputs::compare(std::size_t number, std::optional<config::PositionCompare> compare,

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "config/bounds.h"
 #include "message_text.h"
 
 namespace stepdriver::config {
@@ -90,14 +91,15 @@ class CompareCheck {
 
   // The least way between two actions, and the time that the axis takes for it at its top speed.
   void checkWay(const char* between, double way, std::int64_t needed, const char* why) {
-    if (way * axis_.steps_per_unit < 1.0) {
-      refuse("has {} of {}, but a step of {} is {}", between, show(way), axis_.name,
+    const std::string way_text = roughText(way) + " " + unitOf(axis_.kind);
+    if (way * axis_.steps_per_unit * kSlack < 1.0) {
+      refuse("has {} of {}, but a step of {} is {}", between, way_text, axis_.name,
              show(1.0 / axis_.steps_per_unit));
       return;
     }
     const double seconds = way / axis_.max_speed;
-    if (seconds * 1e9 >= static_cast<double>(needed)) return;
-    refuse("has {} of {}, for which {} takes {} at {}/s, but {} {}", between, show(way), axis_.name,
+    if (seconds * 1e9 * kSlack >= static_cast<double>(needed)) return;
+    refuse("has {} of {}, for which {} takes {} at {}/s, but {} {}", between, way_text, axis_.name,
            secondsText(seconds), show(axis_.max_speed), why, secondsOf(needed));
   }
 

@@ -83,19 +83,20 @@ TEST(ReadIo, RefusesWhatAPositionCantSwitch) {
     return lines.empty() ? "" : lines.front();
   };
   EXPECT_EQ(issue(compareWith("q", "at_end", true)),
-            "outputs/pen/position_compare/axis: is \"q\", but the axes are x, turn");
+            "/outputs/pen/position_compare/axis: is \"q\", but the axes are x, turn");
   EXPECT_EQ(issue(compareWith("x", "places_deg", List{1.0})),
-            "outputs/pen/position_compare/places_deg: is not a known parameter; did you mean "
+            "/outputs/pen/position_compare/places_deg: is not known; did you mean "
             "places_mm?");
   EXPECT_EQ(issue(compareWith("x", "places_mm", 1.0)),
-            "outputs/pen/position_compare/places_mm: is 1.0, but must be a list");
+            "/outputs/pen/position_compare/places_mm: is 1.0, but must be a list");
   EXPECT_EQ(issue(compareWith("x", "places_mm", List{std::string("here")})),
-            "outputs/pen/position_compare/places_mm: has \"here\", but must have places only");
-  EXPECT_EQ(issue(compareWith("x", "cams_mm", List{List{1.0}})),
-            "outputs/pen/position_compare/cams_mm: has [1.0], but each cam must be a list of two "
-            "places, where it begins and ends");
+            "/outputs/pen/position_compare/places_mm: has \"here\", but must have places only");
+  EXPECT_EQ(
+      issue(compareWith("x", "cams_mm", List{List{1.0}})),
+      "/outputs/pen/position_compare/cams_mm: has a list of 1, but each cam must be a list of two "
+      "places, where it begins and ends");
   EXPECT_EQ(issue(compareWith("x", "places_mm", List{1.0, 1.05})),
-            "outputs/pen/position_compare: has a distance between pulses of 5e-05 m, for which x "
+            "/outputs/pen/position_compare: has a distance between pulses of 5e-05 m, for which x "
             "takes 0.0005 s at 0.1 m/s, but a pulse and min_off_ms of it are 0.001 s");
 }
 

@@ -38,6 +38,8 @@ constexpr const char* kEmergencyStop = "emergency_stop";
 constexpr const char* kTool = "tool";
 /// [m] A position of y can switch it, on in here: as far as a move takes the axis.
 constexpr config::PositionCompare::Cam kToolCam{-0.001, 0.001};
+/// That is y.
+constexpr std::size_t kCompared = 1;
 /// The period of a stream of jogs, and their number.
 constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
 constexpr int kJogs = 12;
@@ -1342,7 +1344,7 @@ void Participants::switchTool(int client, bool on) {
 
 void Participants::compareTool(int client) {
   config::PositionCompare compare;
-  compare.axis = configs_[kY].name;
+  compare.axis = configs_[kCompared].name;
   compare.cams = {kToolCam};
   post(client, "the position of y switches the tool",
        machine::SetPositionCompare{kTool, std::move(compare)}, {});
@@ -1617,11 +1619,11 @@ void Participants::checkRest() {
 // At rest in its cam an output is on, and out of it off, however the axis got there.
 void Participants::checkCompared() {
   const pulse::OutputLineState tool = engine_->output(0);
-  const pulse::ChannelState y = engine_->channel(static_cast<int>(kY));
+  const pulse::ChannelState y = engine_->channel(static_cast<int>(kCompared));
   if (tool.compare == 0 || tool.muted || tool.too_long || y.following != 0 || pins_failed_) return;
   const config::OutputConfig& config = optionsOf(schedule_.variant).outputs[0];
   if (clock_.now() < tool.changed + config.min_on_ns) return;
-  const machine::AxisSnapshot& now = controller_->snapshot()->axes[kY];
+  const machine::AxisSnapshot& now = controller_->snapshot()->axes[kCompared];
   const double place = static_cast<double>(y.count - y.slack) + y.between;
   const auto count_of = [&now](double at) { return (at - now.origin) * now.steps_per_unit; };
   const double to_edge = std::min(place - count_of(kToolCam.from), count_of(kToolCam.to) - place);
