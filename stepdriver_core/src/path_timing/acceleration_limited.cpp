@@ -8,6 +8,7 @@
 
 #include "geometry/path_grid.h"
 #include "give_way.h"
+#include "path_speed.h"
 #include "profile/errors.h"
 #include "profile/profile.h"
 #include "reachability.h"
@@ -104,8 +105,12 @@ struct CubicUsage {
 // from the speeds at both ends of an interval are kept until these speeds change.
 class Knots {
  public:
-  Knots(const PathGrid& grid, const std::vector<TimingLimits>& limits, double resolution)
-      : grid_(grid), limits_(limits), resolution_(resolution), axes_(grid.axes()) {
+  Knots(const Path& path, const PathGrid& grid, const std::vector<TimingLimits>& limits)
+      : path_(path),
+        grid_(grid),
+        limits_(limits),
+        resolution_(path.resolution()),
+        axes_(grid.axes()) {
     kept_.reserve(grid.capacity());
     kept_.resize(grid.size());
     closest_.resize(grid.size(), 0.0);
@@ -164,7 +169,7 @@ class Knots {
     Kept& kept = kept_[interval];
     if (!kept.usage) {
       kept.usage = cubicUsage(
-          kept.duration,
+          kept.duration, PathSpeed(path_, grid_[interval].segment, grid_[interval].segment),
           [&](std::size_t j) -> Joint {
             return {grid_.position(interval)[j], grid_.firstAtBegin(interval)[j] * kept.begin};
           },
@@ -214,8 +219,10 @@ class Knots {
     const std::size_t place = knots_[knot].place;
     const bool whole = place != kNone && knots_[knot - 1].place + 1 == place;
     if (whole && !grid_[place - 1].straight) return usageOf(place - 1);
+    const std::size_t last = interval(knot);
+    const std::size_t first = std::min(intervalAfter(knot - 1), last);
     return cubicUsage(
-        time(knot) - time(knot - 1),
+        time(knot) - time(knot - 1), PathSpeed(path_, grid_[first].segment, grid_[last].segment),
         [&](std::size_t j) -> Joint {
           return {position(knot - 1, j), velocity(knot - 1, j)};
         },
@@ -256,13 +263,16 @@ class Knots {
 
   // @param from, to return the joint of an axis at the begin and at the end.
   template <typename From, typename To>
-  CubicUsage cubicUsage(double duration, const From& from, const To& to) const {
+  CubicUsage cubicUsage(double duration, PathSpeed path_speed, const From& from,
+                        const To& to) const {
     CubicUsage usage;
     const double rate = 1.0 / duration;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
-      const auto [p0, v0] = from(j);
-      const auto [p1, v1] = to(j);
-      const double mean = (p1 - p0) * rate;
+      const Joint from_joint = from(j);
+      const Joint to_joint = to(j);
+      const double v0 = from_joint.velocity;
+      const double v1 = to_joint.velocity;
+      const double mean = (to_joint.position - from_joint.position) * rate;
       const double begin = (6.0 * mean - 4.0 * v0 - 2.0 * v1) * rate;
       const double end = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) * rate;
       const int direction = directionOf(v0, v1);
@@ -278,7 +288,12 @@ class Knots {
         speed = std::max(speed, std::abs(v0 + begin * turn * duration / 2.0));
       }
       usage.speed = std::max(usage.speed, speed / limits_[j].speed);
+      if (path_speed.isLimited()) {
+        path_speed.include(
+            j, [=](double u) { return v0 + u * duration * (begin + u * (end - begin) / 2.0); });
+      }
     }
+    if (path_speed.isLimited()) usage.speed = std::max(usage.speed, path_speed.usage());
     return usage;
   }
 
@@ -488,6 +503,7 @@ class Knots {
     return closest;
   }
 
+  const Path& path_;
   const PathGrid& grid_;
   const std::vector<TimingLimits>& limits_;
   double resolution_;  // [unit] the path's resolution
@@ -691,7 +707,7 @@ PathTiming planAccelerationLimited(const Path& path, const std::vector<TimingLim
     plan.excess = std::numeric_limits<double>::infinity();
     return plan;
   }
-  Knots knots(grid, limits, path.resolution());
+  Knots knots(path, grid, limits);
   const Outcome outcome = planKnots(path, limits, begin.speed, grid, knots);
   if (begin.speed > 0.0) {
     plan.excess = outcome.excess;

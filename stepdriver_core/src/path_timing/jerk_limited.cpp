@@ -12,8 +12,10 @@
 #include "geometry/path_grid.h"
 #include "give_way.h"
 #include "jerk_limited_knots.h"
+#include "knot_quintic.h"
 #include "limit_usage.h"
 #include "moving_average.h"
+#include "path_speed.h"
 #include "profile/errors.h"
 #include "profile/profile.h"
 #include "reachability.h"
@@ -46,6 +48,9 @@ constexpr double kMostQuinticDeviation = 0.05;
 constexpr double kNearFoot = 1e-3;
 constexpr int kMostDivisionRounds = 4;
 constexpr std::size_t kPartsOfDivision = 4;
+constexpr int kMostPlansOnPath = 40;
+constexpr double kSlowerBy = 1.5;  // factor between two durations if knots are too close
+constexpr int kLooks = 8;          // parts of a quintic at whose ends its deviation is looked at
 
 // The motion between two stops, or from a speed to a stop.
 class JerkLimitedSection {
@@ -183,17 +188,36 @@ class JerkLimitedSection {
     return middle < path_.roundedUntil(of.segment) ? of.segment - 1 : kNoCorner;
   }
 
-  // Divides intervals in which quintics would deviate from the path.
+  // Divides intervals in which quintics would deviate from the path. If they deviate because knots
+  // would be too close to each other, the motion is slowed down.
   template <typename MakePlan>
   Plan onThePath(const MakePlan& make) {
+    int divisions = 0;
     for (int i = 0;; ++i) {
       Plan plan = make();
+      if (!plan.possible()) return plan;
       std::vector<bool> deviates(grid_.size(), false);
-      if (!plan.possible() || i == kMostDivisionRounds || !findDeviations(plan.knots, deviates)) {
+      if (divisions < kMostDivisionRounds && findDeviations(plan.knots, deviates)) {
+        grid_.divideEach(deviates, kPartsOfDivision);
+        findCaps();
+        ++divisions;
+      } else if (i < kMostPlansOnPath && cutsCorners(plan.knots)) {
+        if (moves()) return impossible(limits_.size());
+        stretch_ *= kSlowerBy;
+      } else {
         return plan;
       }
-      grid_.divideEach(deviates, kPartsOfDivision);
-      findCaps();
+    }
+  }
+
+  // The same motion, slower by stretch_. What is averaged keeps its accelerations, see lower().
+  void stretch(std::vector<AveragedPart>& parts) const {
+    if (stretch_ == 1.0) return;
+    for (AveragedPart& part : parts) {
+      part.time *= stretch_;
+      part.speed /= stretch_;
+      part.acceleration /= stretch_ * stretch_;
+      part.jerk /= stretch_ * stretch_ * stretch_;
     }
   }
 
@@ -241,31 +265,58 @@ class JerkLimitedSection {
     if (i < grid_.size()) return std::nullopt;
     at.jerk = 0.0;
     parts.push_back(at);
-    return planParts(parts);
+    return planParts(std::move(parts));
   }
 
-  Plan planParts(const std::vector<AveragedPart>& parts) const {
-    const double closest = closestKnots(parts, parts.back().time);
-    Plan plan{
-        makeKnots(grid_, limits_, parts, kShortestAverage, closest, path_.resolution()), {}, {}};
+  Plan planParts(std::vector<AveragedPart> parts) const {
+    stretch(parts);
+    Plan plan = planOf(grid_, parts, kShortestAverage, parts.back().time);
     LimitUsage worst;
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
-      plan.segments.push_back(grid_[plan.knots[i].interval].segment);
       plan.straight.push_back(false);
-      if (i > 0) worst.include(usageBefore(plan.knots, i));
+      if (i > 0) worst.include(usageBefore(plan.knots, i, grid_));
     }
     plan.slowdown = worst.slowdown();
     return plan;
   }
 
+  // The knots of a motion, and their segments.
+  // @param time, average see makeKnots() and closestKnots() [s].
+  Plan planOf(const PathGrid& grid, const std::vector<AveragedPart>& parts, double time,
+              double average) const {
+    const std::vector<double> closest = closestKnots(grid, parts, average);
+    Plan plan{makeKnots(grid, limits_, parts, time, closest, path_.resolution()), {}, {}};
+    for (std::size_t i = 0; i < plan.knots.size(); ++i) {
+      plan.segments.push_back(grid[plan.knots[i].interval].segment);
+    }
+    return plan;
+  }
+
+  // The first interval on the way from a knot to the next one.
+  static std::size_t intervalAfter(const JerkLimitedKnots& knots, std::size_t index,
+                                   const PathGrid& grid) {
+    const JerkLimitedKnots::Knot& from = knots[index];
+    // A knot at the end of an interval belongs to it.
+    const bool whole = from.parameter == grid[from.interval].to;
+    return whole ? std::min(from.interval + 1, knots[index + 1].interval) : from.interval;
+  }
+
   // The usage of the limits by the quintic that ends at a knot.
-  LimitUsage usageBefore(const JerkLimitedKnots& knots, std::size_t index) const {
+  LimitUsage usageBefore(const JerkLimitedKnots& knots, std::size_t index,
+                         const PathGrid& grid) const {
     LimitUsage usage;
+    PathSpeed path_speed(path_, grid[intervalAfter(knots, index - 1, grid)].segment,
+                         grid[knots[index].interval].segment);
     const double duration = knots[index].time - knots[index - 1].time;
     for (std::size_t j = 0; j < limits_.size(); ++j) {
-      usage.include(
-          usageOf(knots.state(index - 1, j), knots.state(index, j), duration, limits_[j]));
+      const JerkLimitedKnots::State& begin = knots.state(index - 1, j);
+      const JerkLimitedKnots::State& end = knots.state(index, j);
+      usage.include(usageOf(begin, end, duration, limits_[j]));
+      if (!path_speed.isLimited()) continue;
+      const KnotQuintic curve(begin, end, duration);
+      path_speed.include(j, [&](double u) { return curve.velocity(u); });
     }
+    if (path_speed.isLimited()) usage.speed = std::max(usage.speed, path_speed.usage());
     return usage;
   }
 
@@ -316,33 +367,42 @@ class JerkLimitedSection {
     return false;
   }
 
-  // [s] The least time between two knots, see kLargestRounding.
+  // [s] The least time between two knots in each interval of a grid, see kLargestRounding. An axis
+  // that stands still in an interval isn't rounded there.
   // @param time the time of the average [s].
-  double closestKnots(const std::vector<AveragedPart>& parts, double time) const {
+  std::vector<double> closestKnots(const PathGrid& grid, const std::vector<AveragedPart>& parts,
+                                   double time) const {
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double duration = parts.back().time;
     double speed = 0.0;
     for (const AveragedPart& part : parts) speed = std::max(speed, part.speed);
-    double closest =
+    const double of_times =
         9.0 * std::max(0.5e-9, kEpsilon * (begin_.before + duration)) / kMostRoundingOfTimes;
-    // The speed is a difference of places at times that are rounded.
+    // Along the path. The speed is a difference of places at times that are rounded.
     const double speed_rounding = kEpsilon * duration * speed / time;
-    const double sums = std::sqrt(static_cast<double>(parts.size())) * parts.back().distance;
-    for (std::size_t j = 0; j < limits_.size(); ++j) {
-      double farthest = sums;
-      bool moves = false;
-      for (std::size_t i = 0; i <= grid_.size(); ++i) {
-        farthest = std::max(farthest, std::abs(grid_.position(i)[j]));
-        moves = moves || grid_.position(i)[j] != grid_.position(0)[j];
+    const double sums =
+        kEpsilon * std::sqrt(static_cast<double>(parts.size())) * parts.back().distance;
+    std::vector<double> closest(grid.size(), of_times);
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      double cube = 0.0;
+      double square = 0.0;
+      for (std::size_t j = 0; j < limits_.size(); ++j) {
+        const double begin = grid.position(i)[j];
+        const double end = grid.position(i + 1)[j];
+        const double rate =
+            std::max(std::abs(grid.firstAtBegin(i)[j]), std::abs(grid.firstAtEnd(i)[j]));
+        if (begin == end && rate == 0.0) continue;
+        const double rounding = kEpsilon * std::max(std::abs(begin), std::abs(end)) + rate * sums;
+        const double of_speed = rate * speed_rounding;
+        const double jerk = kLargestRounding * limits_[j].jerk;
+        const double acceleration =
+            kLargestRounding * std::min(limits_[j].acceleration, limits_[j].deceleration);
+        cube = std::max(cube, 60.0 * rounding / jerk);
+        square = std::max({square, 24.0 * of_speed / jerk, 5.8 * rounding / acceleration});
+        closest[i] = std::max(closest[i], 4.0 * of_speed / acceleration);
       }
-      const double rounding = kEpsilon * farthest;
-      if (!moves) continue;
-      const double jerk = kLargestRounding * limits_[j].jerk;
-      const double acceleration =
-          kLargestRounding * std::min(limits_[j].acceleration, limits_[j].deceleration);
-      closest = std::max(
-          {closest, std::cbrt(60.0 * rounding / jerk), std::sqrt(24.0 * speed_rounding / jerk),
-           std::sqrt(5.8 * rounding / acceleration), 4.0 * speed_rounding / acceleration});
+      if (square > closest[i] * closest[i]) closest[i] = std::sqrt(square);
+      if (cube > closest[i] * closest[i] * closest[i]) closest[i] = std::cbrt(cube);
     }
     return closest;
   }
@@ -382,6 +442,49 @@ class JerkLimitedSection {
       if (std::sqrt(turn) * change * change < kNearFoot * path_.resolution()) break;
     }
     return std::sqrt(std::max(0.0, square));
+  }
+
+  // Whether a quintic leaves the path between two knots because others, which would be too close to
+  // each other, were left out between them.
+  bool cutsCorners(const JerkLimitedKnots& knots) const {
+    std::size_t interval = 0;
+    PathPoint point;
+    for (std::size_t i = 1; i < knots.size(); ++i) {
+      giveWayAt(i);
+      const double margin = kNoDifference * (knots[i].distance - knots[i - 1].distance);
+      const auto find = [&](double distance) {
+        while (interval + 1 < grid_.size() && caps_[interval].to < distance) ++interval;
+        return interval;
+      };
+      const std::size_t first = find(knots[i - 1].distance + margin);
+      const std::size_t last = find(knots[i].distance - margin);
+      bool straight = true;
+      for (std::size_t k = first; k <= last; ++k) straight = straight && grid_[k].straight;
+      if (first == last || straight) continue;
+      interval = first;
+      const double h = knots[i].time - knots[i - 1].time;
+      const auto along = [](const JerkLimitedKnots::Knot& knot) -> JerkLimitedKnots::State {
+        return {knot.distance, knot.speed, knot.acceleration};
+      };
+      for (int k = 1; k < kLooks; ++k) {
+        const double u = static_cast<double>(k) / kLooks;
+        const double distance = KnotQuintic(along(knots[i - 1]), along(knots[i]), h).position(u);
+        const std::size_t at = find(distance);
+        grid_.evaluateAt(at, distance - caps_[at].from, point);
+        double square = 0.0;
+        double ahead = 0.0;
+        for (std::size_t j = 0; j < limits_.size(); ++j) {
+          const double off = KnotQuintic(knots.state(i - 1, j), knots.state(i, j), h).position(u) -
+                             point.position[j];
+          square += off * off;
+          ahead += off * point.first[j];
+        }
+        const double most = kMostQuinticDeviation * path_.resolution();
+        if (square - ahead * ahead > most * most) return true;
+      }
+      interval = last;
+    }
+    return false;
   }
 
   bool findDeviations(const JerkLimitedKnots& knots, std::vector<bool>& deviates) const {
@@ -554,12 +657,10 @@ class JerkLimitedSection {
     if (moves() && !keepPast(places, past, {history.end, begin_square})) {
       return impossible(limits_.size());
     }
-    const std::vector<AveragedPart> parts = movingAverage(places, time, moves());
-    Plan plan{makeKnots(grid, limits_, parts, time, closestKnots(parts, time), path_.resolution()),
-              {},
-              {}};
+    std::vector<AveragedPart> parts = movingAverage(places, time, moves());
+    stretch(parts);
+    Plan plan = planOf(grid, parts, time, time);
     for (std::size_t i = 0; i < plan.knots.size(); ++i) {
-      plan.segments.push_back(grid[plan.knots[i].interval].segment);
       plan.straight.push_back(i + 1 < plan.knots.size() && isEven(plan.knots, i, parts, grid));
     }
     const LimitUsage usage = lower(plan.knots, parts, grid, lowered);
@@ -568,7 +669,7 @@ class JerkLimitedSection {
     } else {
       plan.slowdown = usage.slowdown();
     }
-    plan.time = time;
+    plan.time = time * stretch_;
     const double settled = settledIn(ahead, history.end, time, speed);
     plan.settled = timeBefore(parts, beforePeak(given, places, settled));
     return plan;
@@ -611,9 +712,7 @@ class JerkLimitedSection {
       if (!parts[k + 1].even || parts[k].jerk != 0.0) return false;
     }
     if (!to.even || parts[from.part].jerk != 0.0) return false;
-    // A knot at the end of an interval belongs to it, so the way may begin after that.
-    const bool whole = from.parameter == grid[from.interval].to && from.interval < to.interval;
-    for (std::size_t k = from.interval + (whole ? 1 : 0); k <= to.interval; ++k) {
+    for (std::size_t k = intervalAfter(knots, index, grid); k <= to.interval; ++k) {
       if (!grid[k].straight || grid[k].segment != grid[to.interval].segment) return false;
     }
     return true;
@@ -699,7 +798,7 @@ class JerkLimitedSection {
     LimitUsage worst;
     for (std::size_t i = 1; i < knots.size(); ++i) {
       giveWayAt(i);
-      const LimitUsage usage = usageBefore(knots, i);
+      const LimitUsage usage = usageBefore(knots, i, grid);
       worst.include(usage);
       if (usage.most() < 1.0 + kNoDifference) continue;
       const double slowdown = usage.slowdown();
@@ -718,7 +817,7 @@ class JerkLimitedSection {
       }
       if (!straight || usage.speed > 1.0) {
         lowered.speeds.push_back({knots[i - 1].distance, knots[i].distance,
-                                  speed / ((straight ? usage.speed : slowdown) * more)});
+                                  speed * stretch_ / ((straight ? usage.speed : slowdown) * more)});
       }
       if (acceleration > kNoDifference * steepest) {
         const double by = straight ? std::max(usage.acceleration, usage.jerk) : slowdown * slowdown;
@@ -754,6 +853,7 @@ class JerkLimitedSection {
   const std::vector<TimingLimits>& limits_;
   const TimingStart& begin_;
   PathGrid grid_;
+  double stretch_ = 1.0;           // by this factor, the motion takes longer than planned
   std::vector<CeilingSpan> caps_;  // each interval's cap of the speed
 };
 

@@ -40,15 +40,22 @@ double timeUntilMoved(const AveragedPart& part, double distance, double duration
 class KnotMaker {
  public:
   KnotMaker(const PathGrid& grid, const std::vector<TimingLimits>& limits,
-            const std::vector<AveragedPart>& parts, double time, double closest, double resolution)
+            const std::vector<AveragedPart>& parts, double time, const std::vector<double>& closest,
+            double resolution)
       : grid_(grid),
         limits_(limits),
         parts_(parts),
         time_(time),
-        closest_(closest),
+        each_closest_(closest),
+        latest_(closest),
         most_(kMostJerkDeviation * resolution / kPeanoKernel),
-        last_(parts.back().time - closest),
-        knots_(grid.axes()) {}
+        knots_(grid.axes()) {
+    for (std::size_t i = latest_.size() - 1; i-- > 0;) {
+      latest_[i] = std::max(latest_[i], latest_[i + 1]);
+    }
+    for (double& each : latest_) each = parts.back().time - each;
+    last_ = latest_.front();
+  }
 
   JerkLimitedKnots make() {
     appendPlace(0, parts_.front(), 0.0, 0);
@@ -83,12 +90,13 @@ class KnotMaker {
     if (counts) leave(index, part.time + h);
     begin_ += grid_[interval_].length;
     ++interval_;
-    if (!curved) return;
-    if (!isTooClose(part.time + h)) {
+    last_ = latest_[interval_];
+    if (curved && !isTooClose(part.time + h)) {
       appendPlace(interval_, part, h, index);
     } else if (from_straight != to_straight) {
       turns_ = true;
     }
+    closest_ = std::max(closest_, each_closest_[interval_]);
   }
 
   void beginPart(std::size_t index) {
@@ -172,6 +180,7 @@ class KnotMaker {
   void append(const JerkLimitedKnots::Knot& knot, const double* position, const double* first,
               const double* second) {
     knots_.append(knot, position, first, second);
+    closest_ = each_closest_[interval_];
     jerk_ = parts_[knot.part].jerk;
     off_ = 0.0;
     turns_ = false;
@@ -194,10 +203,12 @@ class KnotMaker {
   const PathGrid& grid_;
   const std::vector<TimingLimits>& limits_;
   const std::vector<AveragedPart>& parts_;
-  double time_;     // [s] the time of the average
-  double closest_;  // [s] the least time between two knots
-  double most_;     // [unit] the largest off_ times h^2 that is left out
-  double last_;     // [s] the latest time of a knot before the end
+  double time_;  // [s] the time of the average
+  const std::vector<double>& each_closest_;
+  std::vector<double> latest_;  // [s] for each interval, the latest time of a knot before the end
+  double closest_ = 0.0;        // [s] the least time from the last knot to the next one
+  double most_;                 // [unit] the largest off_ times h^2 that is left out
+  double last_ = 0.0;  // [s] the latest time of a knot before the end in the current interval
   JerkLimitedKnots knots_;
   PathPoint point_;
   std::size_t interval_ = 0;  // the interval that contains the motion
@@ -226,8 +237,8 @@ double highestJerk(const PathGrid& grid, std::size_t interval,
 }
 
 JerkLimitedKnots makeKnots(const PathGrid& grid, const std::vector<TimingLimits>& limits,
-                           const std::vector<AveragedPart>& parts, double time, double closest,
-                           double resolution) {
+                           const std::vector<AveragedPart>& parts, double time,
+                           const std::vector<double>& closest, double resolution) {
   return KnotMaker(grid, limits, parts, time, closest, resolution).make();
 }
 

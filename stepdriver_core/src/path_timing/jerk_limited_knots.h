@@ -66,9 +66,10 @@ double highestJerk(const PathGrid& grid, std::size_t interval,
 /// hundredth of `resolution` or less.
 ///
 /// @param time The time of the average [s].
-/// @param closest The least time between two knots [s].
+/// @param closest for each interval [s]. A knot is at least this much later than the one before it,
+///   by the longest of the intervals on the way between them.
 JerkLimitedKnots makeKnots(const PathGrid& grid, const std::vector<TimingLimits>& limits,
-                           const std::vector<AveragedPart>& parts, double time, double closest,
-                           double resolution);
+                           const std::vector<AveragedPart>& parts, double time,
+                           const std::vector<double>& closest, double resolution);
 
 }  // namespace stepdriver::motion

@@ -182,10 +182,12 @@ class Hull {
 
 // The microstep itself, half a one of each axis, and what the plan may deviate by.
 constexpr double kNear = 1.0 + 0.71 + 0.2;
-// A speed that is measured between two steps may be this much too high: each of them may come too
-// soon or too late by the hundredth of a microstep within which cubics replace a quintic, and by as
-// much again where a plan leaves out what makes no difference.
-constexpr double kMostOver = 1.05;
+// A speed that is measured between two steps, a microstep apart, may be this much too high: each of
+// them may come too soon or too late by the part of a microstep by which cubics deviate from a
+// quintic. What a plan exceeds a speed by, it is slowed down by as a whole, except from a speed: a
+// thousandth is left then. The speed that is allowed is the highest one of all that is within the
+// tolerance, so a rounded corner adds nothing.
+constexpr double kMostOver = 1.0 + 2.0 * motion::kQuinticError + 0.001;
 constexpr double kRounding = 2e-9;  // [s] the times of two steps are rounded by this
 
 // Also of what happens in the shortest time between two knots.

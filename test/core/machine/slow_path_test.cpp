@@ -11,6 +11,7 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "support/constants.h"
 #include "support/planned_path.h"
+#include "trajectory/spline.h"
 
 // Paths on which a ramp lasts microseconds and the way at constant speed minutes: what the plan
 // leaves out of the ramp must not change the way.
@@ -25,6 +26,10 @@ using test::pathAxis;
 using test::PathAxisLimits;
 using test::planned;
 using test::PlannedPath;
+
+// The cubics of a quintic may be off by a hundredth of a microstep at each of two steps, and a plan
+// may exceed a speed by a thousandth.
+constexpr double kMostOver = 1.0 + 2.0 * motion::kQuinticError + 0.001;
 
 PathRequest lines(const std::vector<std::pair<double, double>>& ends_and_speeds) {
   PathRequest request{{"x"}, {}, false, 0.0, 0.0};
@@ -155,6 +160,55 @@ TEST(SlowPath, BeforeAFastLineDoesNotMakeThatOneFaster) {
   ASSERT_EQ(steps.size(), 174U);
   for (std::size_t i = 171; i < steps.size(); ++i) {
     EXPECT_GE(static_cast<double>(steps[i].first - steps[i - 1].first) * 1e-9 * 17'600.0, 0.999);
+  }
+}
+
+// The lowest limits of y need a long time between knots for its way of a few roundings of a double.
+// In that time, x and z could make the whole square.
+TEST(SlowPath, OfAnAxisThatHardlyMovesLeavesOutNoWayOfTheOthers) {
+  const std::vector<motion::PathAxis> axes = {pathAxis("x", {1.0, 1e6, 1e12, 1e15}),
+                                              pathAxis("y", {1.0, 1e-3, 1e-3, 1e-3}),
+                                              pathAxis("z", {1.0, 1e6, 1e12, 1e15})};
+  for (const double way : {1e-13, 1e-12, 1e-11}) {
+    SCOPED_TRACE(way);
+    PathRequest request{{"x", "y", "z"}, {}, false, 0.0, 1.0};
+    double y = 0.0;
+    for (const auto& [x, z] : std::vector<std::pair<double, double>>{
+             {1e4, 0.0}, {11e3, 0.0}, {11e3, 1e3}, {1e4, 1e3}, {1e4, 0.0}}) {
+      request.segments.emplace_back().end = {x, y, z};
+      y += way;
+    }
+    const PlannedPath path = planned(request, axes);
+    EXPECT_EQ(path.steps(0).size(), 12'000U);
+    EXPECT_EQ(path.steps(2).size(), 2000U);
+  }
+}
+
+// Knots are so close to each other that the motion has to run ahead between two of them: the speed
+// along the path counts there, too.
+TEST(SlowPath, KeepsItsSpeedBetweenKnotsThatAreAsCloseAsTheyMayBe) {
+  struct Case {
+    double tolerance;
+    double velocity;
+    double jerk;
+    std::vector<std::pair<double, double>> ends;
+  };
+  for (const Case& made :
+       {Case{0.0626, 24'340.0, 1e15, {{0.00341, 0.0}, {-1497.27, 546.282}, {-1494.92, 546.797}}},
+        Case{0.0, 16'280.0, 1e15, {{5.01928, 0.0}}}, Case{0.0, 60'000.0, 1e15, {{13.0325, 0.0}}}}) {
+    SCOPED_TRACE(made.velocity);
+    const std::vector<motion::PathAxis> axes = {pathAxis("x", {1.0, 1e6, 1e12, made.jerk}),
+                                                pathAxis("y", {1.0, 1e6, 1e12, made.jerk})};
+    PathRequest request{{"x", "y"}, {}, false, made.velocity, made.tolerance};
+    for (const auto& [x, y] : made.ends) request.segments.emplace_back().end = {x, y};
+    const AxisSteps steps = planned(request, axes).steps(0);
+    double shortest = 1.0;
+    for (std::size_t i = 1; i < steps.size(); ++i) {
+      if (steps[i].second != steps[i - 1].second) continue;
+      shortest =
+          std::min(shortest, static_cast<double>(steps[i].first - steps[i - 1].first) * 1e-9);
+    }
+    EXPECT_GE(shortest * made.velocity * kMostOver, 1.0);
   }
 }
 
