@@ -358,15 +358,17 @@ class Knots {
     append({time, interval, place, 0.0, parameter, speed, speed == 0.0});
   }
 
-  // If knots are too close to each other, only the first one stays, or one at rest. If the others
-  // make a difference, they are replaced by a state of the same motion at the shortest time from
-  // the one that stays. What is left out is then only how the axes move in that time; before and
-  // after it, the motion is as planned.
+  // If knots are too close to each other, only the first one stays, or one at rest, or one at a
+  // place at which other axes begin to move, which need more time between knots, or less: what
+  // happens in that time must not be left out of the other ones. If the others make a difference,
+  // they are replaced by a state of the same motion at the shortest time from the one that stays.
+  // What is left out is then only how the axes move in that time; before and after it, the motion
+  // is as planned.
   void append(const Knot& next) {
     const double since = knots_.empty() ? kForever : next.time - knots_.back().time;
     const double closest = knots_.empty() ? 0.0 : closestBetween(knots_.size() - 1, next);
-    if (since < closest && next.rests) {
-      appendRest(next);
+    if (since < closest && (next.rests || replacesLast(next))) {
+      appendInstead(next);
     } else {
       if (skips_ && since >= 2.0 * closest && matters(knots_.back(), seen_, next)) {
         push(within(seen_, next, knots_.back().time + closest));
@@ -386,21 +388,31 @@ class Knots {
     skips_ = false;
   }
 
-  // @pre the knot is too close to the last one.
-  void appendRest(const Knot& rest) {
+  // Whether a knot that is too close to the last one is where the shortest time between knots
+  // changes, and isn't too close to the one before that.
+  bool replacesLast(const Knot& next) const {
+    const bool changes = next.place != kNone && next.place < grid_.size() &&
+                         closest_[next.place] != closest_[next.interval];
+    if (!changes || knots_.size() < 2 || knots_.back().rests) return false;
+    const std::size_t before = knots_.size() - 2;
+    return next.time - knots_[before].time >= closestBetween(before, next);
+  }
+
+  // @pre the knot is too close to the last one, which it replaces unless the motion rests there.
+  void appendInstead(const Knot& next) {
     if (knots_.size() > 1 && !knots_.back().rests) {
       const Knot close = knots_.back();
       knots_.pop_back();
       const Knot& before = knots_.back();
-      const double closest = closestBetween(knots_.size() - 1, rest);
-      const bool has_room = rest.time - before.time >= 2.0 * closest;
-      if (has_room && !close.skipped && matters(before, close, rest)) {
-        push(within(before, close, rest.time - closest));
+      const double closest = closestBetween(knots_.size() - 1, next);
+      const bool has_room = next.time - before.time >= 2.0 * closest;
+      if (has_room && !close.skipped && matters(before, close, next)) {
+        push(within(before, close, next.time - closest));
         knots_.back().skipped = false;
       }
       skips_ = true;
     }
-    push(rest);
+    push(next);
   }
 
   // Whether the cubic between two knots is off by more than a small part of the resolution because

@@ -212,5 +212,29 @@ TEST(SlowPath, KeepsItsSpeedBetweenKnotsThatAreAsCloseAsTheyMayBe) {
   }
 }
 
+// x stops from a high speed 0.1 us before y, which needs 0.5 ms between knots, begins to move.
+TEST(SlowPath, DoesNotRunAheadIntoAPartOnWhichKnotsAreFartherApart) {
+  const std::vector<motion::PathAxis> axes = {
+      pathAxis("x", {1.0, 90'035.614, 745'192'562'223.6, 0.0}),
+      pathAxis("y", {1.0, 9.371011661, 0.1329103175, 0.0})};
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 1.7559892387237139};
+  request.segments.emplace_back().end = {0.19006369593557199, 0.0};
+  PathSegment& slow = request.segments.emplace_back();
+  slow.shape = PathSegment::Shape::kBezier;
+  slow.end = {0.25340538849034422, -0.060777528484635475};
+  slow.control1 = {0.22783535412363043, -0.0028986354928957105};
+  slow.control2 = {0.24894925164188783, -0.02315781165444087};
+  slow.velocity = 0.004884493446022895;
+  PathSegment& arc = request.segments.emplace_back();
+  arc.shape = PathSegment::Shape::kArcThrough;
+  arc.plane = {"x", "y"};
+  arc.end = {-198.86743082986632, 1885.232135093469};
+  arc.point = {744.2316498283019, 1031.6785315401421};
+  arc.velocity = 3584.968013695498;
+  const PlannedPath path = planned(request, axes);
+  ASSERT_FALSE(path.steps(0).empty());
+  EXPECT_GT(path.steps(0).front().first, 10'000'000'000);
+}
+
 }  // namespace
 }  // namespace stepdriver
