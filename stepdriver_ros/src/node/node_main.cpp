@@ -82,7 +82,7 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~enable  ~home
               ~move_line  ~follow_path  ~append_path  ~plan_path  ~hold  ~resume  ~dump
-              ~set_output
+              ~set_output  ~set_position_compare
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               ~rig/inputs/NAME (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~AXIS/driver  ~state

@@ -15,7 +15,6 @@
 #include "stepdriver_core/machine/machine.h"
 #include "support/constants.h"
 #include "support/corexy_bench.h"
-#include "support/gantry_bench.h"
 #include "support/path_bench.h"
 #include "support/refusal.h"
 
