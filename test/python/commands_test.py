@@ -2,7 +2,7 @@
 
 import unittest
 
-from stepdriver_core import (AxisState, Error, HomingEnd, MoveEnd, NoSuchAxis, NotHomed, Refused)
+from stepdriver_core import (AxisState, ChipState, Error, HomingEnd, MoveEnd, NoSuchAxis, NotHomed, Refused)
 
 import support
 
@@ -74,6 +74,11 @@ class AnAxis(support.MachineTest):
         self.x.set_limits()
         self.assertEqual(self.x.limits, limits)
 
+    def test_has_no_chip_to_set_a_current_of(self):
+        self.assertEqual(self.machine["x"].state.chips, ())
+        with self.assertRaisesRegex(Refused, "its current is set by the board"):
+            self.machine["x"].set_current(0.5)
+
     def test_jogs_until_it_is_stopped(self):
         self.x.jog(0.05)
         self.machine.advance(0.5)
@@ -139,6 +144,26 @@ class AnAxis(support.MachineTest):
         self.assertEqual((state.fault, state.remedy, state.position_note), ("", "", ""))
         self.assertEqual((state.slack, state.skew, state.brake_engaged), (0.0, 0.0, False))
         self.assertAlmostEqual(state.planned, state.position, delta=0.001)
+
+
+class AnAxisWithAChipOnAUart(support.MachineTest):
+    CONFIG = {"axes": {"x": support.plain(
+        ("GPIO17", "GPIO27", "GPIO22"), driver="tmc2209",
+        tmc={"port": "/dev/serial0", "address": 0, "sense_resistor_mohm": 110.0, "run_current_a": 0.8})}}
+
+    def test_has_currents_that_can_be_set(self):
+        [chip] = self.machine["x"].state.chips
+        self.assertIsInstance(chip, ChipState)
+        self.assertEqual((chip.motor, chip.is_set_up, chip.at_least_celsius), ("", True, 0))
+        self.assertAlmostEqual(chip.run_current, 0.795, delta=0.001)
+        self.machine["x"].set_current(0.5, 0.1)
+        [chip] = self.machine["x"].state.chips
+        self.assertAlmostEqual(chip.run_current, 0.49, delta=0.001)
+        self.assertAlmostEqual(chip.hold_current, 0.092, delta=0.001)
+        with self.assertRaisesRegex(Refused, "to 0.8 A, its tmc/run_current_a"):
+            self.machine["x"].set_current(5.0)
+        self.machine["x"].set_current()
+        self.assertAlmostEqual(self.machine["x"].state.chips[0].run_current, 0.795, delta=0.001)
 
 
 class AMachine(support.MachineTest):

@@ -2,7 +2,7 @@
 
 import unittest
 
-from stepdriver_core import Error, InputState, OutputState, Refused
+from stepdriver_core import Error, InputState, OutputState, Refused, line
 
 import support
 
@@ -51,6 +51,21 @@ class OutputsAndInputs(support.MachineTest):
         self.machine.rig.press_input("paper", False)
         self.machine.advance(0.02)
         self.assertFalse(self.machine.inputs["paper"].active)
+
+    def test_a_path_switches_outputs_where_its_segments_begin(self):
+        pen = self.machine.outputs["pen"]
+        self.assertFalse(pen.on)
+        move = self.machine.follow_path(
+            ["x"], [line([0.01]), line([0.05], outputs={"pen": True}), line([0.06], outputs={"pen": False})],
+            tolerance=1e-4, leads={"pen": (0.01, 0.0)})
+        self.machine.advance(0.4)
+        self.assertTrue(self.machine.outputs["pen"].on)
+        self.assertTrue(0.01 < self.machine["x"].position < 0.05)
+        self.assertTrue(move.wait().message)
+        self.assertFalse(self.machine.outputs["pen"].on)
+        for outputs, leads in (({"pan": True}, {}), ({"pen": True}, {"pen": (11.0, 0.0)})):
+            with self.assertRaisesRegex(Refused, "pan|pen"):
+                self.machine.follow_path(["x"], [line([0.07], outputs=outputs)], leads=leads)
 
     def test_unknown_names_are_refused(self):
         with self.assertRaisesRegex(Refused, r"^there is no output pan \(outputs: .*pen.*\)$"):

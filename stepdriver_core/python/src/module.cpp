@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -108,11 +109,15 @@ CoordinatedMoveHandle moveLine(const SessionPointer& session, const py::dict& po
           session->run([&](OpenMachine& open) { return open.machine().moveLine(request); })};
 }
 
+// How much earlier than at their places outputs are switched on and off [s].
+using Leads = std::map<std::string, std::pair<double, double>>;
+
 CoordinatedMoveHandle followPath(const SessionPointer& session, const Names& names,
                                  const py::iterable& segments, bool relative, double velocity,
-                                 double tolerance, bool more_follows) {
-  const motion::PathRequest request{
+                                 double tolerance, bool more_follows, const Leads& leads) {
+  motion::PathRequest request{
       names, segmentsOf(segments, names), relative, velocity, tolerance, more_follows};
+  for (const auto& [name, lead] : leads) request.leads.push_back({name, lead.first, lead.second});
   return {session,
           session->run([&](OpenMachine& open) { return open.machine().followPath(request); })};
 }
@@ -355,6 +360,7 @@ void bindAxes(SessionClass& session) {
             });
           },
           "axis"_a, "max_speed"_a, "acceleration"_a, "deceleration"_a, "jerk"_a)
+      .def("set_current", command(&axis::Axis::setCurrent), "axis"_a, "run"_a, "hold"_a)
       .def(
           "limits",
           [](const Session& self, const std::string& name) {
@@ -380,7 +386,7 @@ void bindMachine(SessionClass& session) {
   session.def("home", &home, "axes"_a)
       .def("move_line", &moveLine, "positions"_a, "relative"_a, "velocity"_a, "duration"_a)
       .def("follow_path", &followPath, "axes"_a, "segments"_a, "relative"_a, "velocity"_a,
-           "tolerance"_a, "more_follows"_a)
+           "tolerance"_a, "more_follows"_a, "leads"_a)
       .def("follow_trajectory", &followTrajectory, "axes"_a, "times"_a, "positions"_a,
            "velocities"_a, "accelerations"_a, "allow_slower"_a, "begin_in"_a)
       .def("jog_all", &jogAll, "velocities"_a, "since"_a)

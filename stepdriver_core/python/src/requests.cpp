@@ -153,6 +153,9 @@ motion::PathSegment segmentOf(const py::handle& item, const std::vector<std::str
   }
   segment.velocity = item.attr("velocity").cast<double>();
   segment.tolerance = item.attr("tolerance").cast<std::optional<double>>();
+  for (const auto& [name, on] : item.attr("outputs").cast<std::map<std::string, bool>>()) {
+    segment.outputs.push_back({name, on});
+  }
   return segment;
 }
 

@@ -52,6 +52,26 @@ std::optional<double> secondsOf(const std::optional<pulse::Nanoseconds>& time) {
 
 }  // namespace
 
+namespace {
+
+// The driver chips on a UART; empty: there is none.
+py::tuple chipsOf(const axis::AxisState& state) {
+  py::list chips;
+  if (state.drivers != nullptr) {
+    for (const driver::DriverState& chip : *state.drivers) {
+      chips.append(py::dict(
+          "motor"_a = chip.motor, "is_set_up"_a = chip.is_set_up,
+          "run_current"_a = chip.run_current, "hold_current"_a = chip.hold_current,
+          "present_current"_a = chip.present_current, "stealth_chop"_a = chip.stealth_chop,
+          "at_least_celsius"_a = chip.at_least_celsius,
+          "temperature_warning"_a = chip.temperature_warning, "stall_guard"_a = chip.stall_guard));
+    }
+  }
+  return py::tuple(chips);
+}
+
+}  // namespace
+
 py::dict valueOf(const axis::AxisState& state) {
   return py::dict(
       "enabled"_a = state.enabled, "asleep"_a = state.asleep, "powered"_a = state.powered,
@@ -62,7 +82,8 @@ py::dict valueOf(const axis::AxisState& state) {
       "planned"_a = state.planned, "velocity"_a = state.velocity, "slack"_a = state.slack,
       "skew"_a = state.skew, "target"_a = state.target, "time_left"_a = state.time_left,
       "fault"_a = state.fault, "remedy"_a = state.remedy, "stops"_a = state.stops,
-      "stopped_by"_a = state.stopped_by, "position_note"_a = state.position_note);
+      "stopped_by"_a = state.stopped_by, "position_note"_a = state.position_note,
+      "chips"_a = chipsOf(state));
 }
 
 py::dict valueOf(const axis::AxisLimits& limits) {

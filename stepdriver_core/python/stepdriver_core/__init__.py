@@ -32,6 +32,7 @@ from ._paths import PathSegment, Segment, arc_around, arc_through, bezier, line
 from ._plans import Motion, Part, Piece, Plan
 from ._states import (
     AxisState,
+    ChipState,
     CoordinatedResult,
     Endstops,
     EngineFigures,
@@ -49,6 +50,7 @@ from ._states import (
 __all__ = [
     "Axis",
     "AxisState",
+    "ChipState",
     "ConfigError",
     "ConfigIssue",
     "CoordinatedMove",

@@ -8,7 +8,7 @@ from . import _core
 from ._errors import NotHomed
 from ._moves import Move
 from ._plans import Part, Piece, Plan
-from ._states import AxisState, Endstops, HomingEnd, HomingResult, Limits
+from ._states import AxisState, Endstops, HomingEnd, HomingResult, Limits, _axis_state
 
 
 class Axis:
@@ -185,6 +185,17 @@ class Axis:
         wanted = (max_speed, acceleration, deceleration, jerk)
         self._session.set_limits(self._name, *(limit or 0.0 for limit in wanted))
 
+    def set_current(self, run: Optional[float] = None, hold: Optional[float] = None) -> None:
+        """Changes the currents of its driver chips on a UART (``tmc`` in the configuration), at rest or in motion, and
+        returns when the chips have them. ``state.chips`` has what was set: the step of the chip below what is wanted.
+
+        run: [A rms] in motion, at most the configured one; None: as configured.
+        hold: [A rms] at rest, at most ``run``; None: as configured, or ``run`` if that is lower.
+
+        Raises Refused if a current is out of range, or if no motor has such a chip.
+        """
+        self._session.set_current(self._name, run or 0.0, hold or 0.0)
+
     @property
     def limits(self) -> Limits:
         """The limits of its next motions."""
@@ -195,7 +206,7 @@ class Axis:
     @property
     def state(self) -> AxisState:
         """What the axis is and does now: consistent, of one instant."""
-        return AxisState(**self._session.state(self._name))
+        return _axis_state(self._session.state(self._name))
 
     @property
     def position(self) -> float:

@@ -169,6 +169,7 @@ class Machine:
         velocity: Optional[float] = None,
         tolerance: float = 0.0,
         more_follows: bool = False,
+        leads: Optional[Mapping[str, Tuple[float, float]]] = None,
     ) -> CoordinatedMove:
         """Moves several axes along lines, arcs and Bezier curves, from where they stand to rest at the end.
 
@@ -180,11 +181,13 @@ class Machine:
             the limits of all axes allow.
         tolerance: [unit] how far corners may be rounded; 0: the axes stop at each corner.
         more_follows: segments will be appended by CoordinatedMove.append(): the axes wait at the end.
+        leads: [s] how much earlier than at their places outputs of the segments are switched on and off, by their
+            names: from 0 to 10.
 
         Raises Refused as Axis.move_to(), if one of the axes moves, or naming the segment that is wrong, from 0 on.
         """
         handle = self._session.follow_path(
-            list(axes), segments, relative, velocity or 0.0, tolerance, more_follows
+            list(axes), segments, relative, velocity or 0.0, tolerance, more_follows, dict(leads or {})
         )
         return self._coordinated(handle)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Optional, Sequence, Tuple, Union
+from dataclasses import dataclass, field
+from typing import Mapping, Optional, Sequence, Tuple, Union
 
 
 @dataclass(frozen=True)
@@ -20,20 +20,29 @@ class PathSegment:
     control2: Sequence[float] = ()
     velocity: float = 0.0
     tolerance: Optional[float] = None
+    outputs: Mapping[str, bool] = field(default_factory=dict)
 
 
 Segment = Union[PathSegment, Sequence[float]]
 """A sequence of numbers, one for each axis of the path, is a line to there."""
 
 
-def line(end: Sequence[float], *, velocity: Optional[float] = None, tolerance: Optional[float] = None) -> PathSegment:
+def line(
+    end: Sequence[float],
+    *,
+    velocity: Optional[float] = None,
+    tolerance: Optional[float] = None,
+    outputs: Optional[Mapping[str, bool]] = None,
+) -> PathSegment:
     """A straight line to ``end``.
 
     end: [unit] a number for each axis of the path, m or rad.
     velocity: the highest speed along this segment, [m/s] or [rad/s]; None: that of the path.
     tolerance: [unit] how far the corner at its end may be rounded; None: that of the path.
+    outputs: outputs with a name that are switched where the segment begins, at that time and without a stop: True is
+        on. A line to where the path already is switches them there, for example at its end.
     """
-    return PathSegment("line", end, velocity=velocity or 0.0, tolerance=tolerance)
+    return PathSegment("line", end, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or {})
 
 
 def arc_around(
@@ -44,16 +53,26 @@ def arc_around(
     plane: Optional[Tuple[str, str]] = None,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
+    outputs: Optional[Mapping[str, bool]] = None,
 ) -> PathSegment:
     """A circular arc around ``centre``: a full turn if both of its ends are the same. Other axes move in proportion
     to its angle.
 
-    end, velocity, tolerance: as for line().
+    end, velocity, tolerance, outputs: as for line().
     centre: [unit] of the two axes of the plane. It must be as far from the begin as from the end, up to rounding.
     clockwise: from the second axis of the plane to the first, instead of the other way.
     plane: the names of its two axes; None: the first two of the path.
     """
-    return PathSegment("arc_around", end, plane, centre, clockwise, velocity=velocity or 0.0, tolerance=tolerance)
+    return PathSegment(
+        "arc_around",
+        end,
+        plane,
+        centre,
+        clockwise,
+        velocity=velocity or 0.0,
+        tolerance=tolerance,
+        outputs=outputs or {},
+    )
 
 
 def arc_through(
@@ -63,13 +82,16 @@ def arc_through(
     plane: Optional[Tuple[str, str]] = None,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
+    outputs: Optional[Mapping[str, bool]] = None,
 ) -> PathSegment:
     """A circular arc through ``point``, which lies between its begin and its end.
 
     point: [unit] of the two axes of the plane.
     The others: as for arc_around().
     """
-    return PathSegment("arc_through", end, plane, point, velocity=velocity or 0.0, tolerance=tolerance)
+    return PathSegment(
+        "arc_through", end, plane, point, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or {}
+    )
 
 
 def bezier(
@@ -79,12 +101,19 @@ def bezier(
     *,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
+    outputs: Optional[Mapping[str, bool]] = None,
 ) -> PathSegment:
     """A cubic Bezier curve.
 
     control1, control2: [unit] its control points next to its begin and next to its end, like ``end``.
-    end, velocity, tolerance: as for line().
+    end, velocity, tolerance, outputs: as for line().
     """
     return PathSegment(
-        "bezier", end, control1=control1, control2=control2, velocity=velocity or 0.0, tolerance=tolerance
+        "bezier",
+        end,
+        control1=control1,
+        control2=control2,
+        velocity=velocity or 0.0,
+        tolerance=tolerance,
+        outputs=outputs or {},
     )

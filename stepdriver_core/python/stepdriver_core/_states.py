@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Dict, Optional, Tuple
+from typing import Any, Dict, Optional, Tuple
 
 
 class MoveEnd(str, enum.Enum):
@@ -71,6 +71,30 @@ class HomingResult:
 
 
 @dataclass(frozen=True)
+class ChipState:
+    """What a driver chip on a UART (``tmc`` in the configuration) has told of itself."""
+
+    motor: str
+    """The name of its motor, on an axis with several; empty: it is the only one."""
+    is_set_up: bool
+    """Its registers are written and verified."""
+    run_current: float
+    """[A rms] as it is set, in motion."""
+    hold_current: float
+    """[A rms] the same at rest."""
+    present_current: float
+    """[A rms] at this moment, on the way from one to the other."""
+    stealth_chop: bool
+    """It chops silently at this moment."""
+    at_least_celsius: int
+    """[degrees C] the highest threshold that its temperature is above; 0: none."""
+    temperature_warning: bool
+    """It will soon switch itself off."""
+    stall_guard: Optional[int]
+    """SG_RESULT in the last motion: the lower, the higher the load; None: the chip hasn't measured it."""
+
+
+@dataclass(frozen=True)
 class AxisState:
     """What an axis is and does at one instant."""
 
@@ -123,6 +147,13 @@ class AxisState:
     """At which endstop its last motion ended, and where; empty: at none, it was a homing, or the next one has begun."""
     position_note: str
     """Why the position that was kept over a restart can't be trusted; empty: it can, or there is none."""
+    chips: Tuple[ChipState, ...]
+    """Its driver chips on a UART, one for each motor that has such a chip."""
+
+
+def _axis_state(fields: Dict[str, Any]) -> AxisState:
+    values: Dict[str, Any] = {**fields, "chips": tuple(ChipState(**chip) for chip in fields["chips"])}
+    return AxisState(**values)
 
 
 @dataclass(frozen=True)
