@@ -40,7 +40,7 @@ class Dump {
         tmc.hold_delay, static_cast<int>(tmc.mode), tmc.interpolate);
   }
   void add(const config::HomingConfig& homing) {
-    all(static_cast<int>(homing.kind), homing.at_max, homing.input, homing.approaches,
+    all(static_cast<int>(homing.kind), homing.at_max, homing.input, homing.flag, homing.approaches,
         homing.seek_speed, homing.latch_speed, homing.pull_off, homing.final_position,
         homing.offset, homing.max_travel, homing.timeout, homing.debounce, homing.order);
   }
@@ -107,7 +107,8 @@ class Dump {
   void add(const config::InputConfig& input) { all(input.name, input.line, input.debounce_ns); }
   void add(const setup::SimulatedOutput& output) { add(output.fail_write_after); }
   void add(const setup::SimulatedInput& input) {
-    all(input.pressed, input.bounces, input.bounce_ms);
+    all(input.pressed, input.bounces, input.bounce_ms, input.axis, input.from, input.to,
+        input.every, input.hysteresis);
   }
   void add(const joystick::JogAxis& axis) {
     all(axis.name, axis.joystick_axis, static_cast<int>(axis.kind), axis.max_speed,

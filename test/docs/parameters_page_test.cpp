@@ -95,7 +95,7 @@ heartbeat: {pin: Y}
 motor_power: {pin: W, on_ms: 5.0, feedback: {pin: V, active_level: low}}
 outputs: {x: {pin: U}}
 inputs: {x: {pin: T, active_level: low}}
-simulation: {axes: {x: {}}, outputs: {x: {}}, inputs: {x: {}}}
+simulation: {axes: {x: {}}, outputs: {x: {}}, inputs: {x: {axis: x, from_mm: 1.0, to_mm: 2.0}}}
 axes:
   x:)" + kAxisMap;
   if (rotary) text = replaced(replaced(text, "steps_per_mm", "steps_per_degree"), "_mm", "_deg");
@@ -438,10 +438,10 @@ TEST(HomingKinds, HaveTheKeysOnThePageAndNoOthers) {
     }
   }
   std::set<std::string> known;
-  for (const std::string kind : {"limit", "block", "direct"}) {
+  for (const char* kind : {"limit", "flag", "flag_centre", "index", "block", "direct"}) {
     Node node = homing();
-    const ConfigValue value(kind);
-    node.base = with(node.base, "axes/x/homing/kind", &value);
+    const ConfigValue only_kind(ConfigValue::Map{{"kind", kind}});
+    node.base = with(node.base, "axes/x/homing", &only_kind);
     for (const std::string& key : knownIn(node, "axes/x/homing")) known.insert(key);
   }
   EXPECT_EQ(known, on_page);

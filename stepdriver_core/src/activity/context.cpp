@@ -37,6 +37,21 @@ std::vector<int> Context::addressesOn(const std::string& port) const {
   return addresses;
 }
 
+void Context::beginTurn(Outputs& outputs) {
+  // Edges are reported within a few turns.
+  constexpr std::size_t kMostSlips = 64;
+  out = &outputs;
+  if (slips_.empty() || slips_.back().slipped != slipped) slips_.push_back({last_turn_, slipped});
+  if (slips_.size() > kMostSlips) slips_.pop_front();
+  last_turn_ = now;
+}
+
+pulse::Nanoseconds Context::motionTimeAt(pulse::Nanoseconds clock_time) const {
+  const auto slip = std::find_if(slips_.rbegin(), slips_.rend(),
+                                 [&](const Slip& one) { return one.from <= clock_time; });
+  return clock_time - (slip != slips_.rend() ? slip->slipped : slips_.front().slipped);
+}
+
 void Context::endTurn() {
   for (const FollowCommand& command : follow_commands_) {
     pulse::Command& posted = out->commands[command.index];

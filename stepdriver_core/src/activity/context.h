@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -79,6 +80,9 @@ class Context : public AnswerSink {
   bool hasUnknownStop() const { return stops_asked != std::max(stops_handled, stops_ramping); }
 
   pulse::Nanoseconds motionNow() const { return now - slipped; }
+  /// The motion time at a clock time of the last seconds. It is uncertain by how far the timeline
+  /// slid between the turns before and after that.
+  pulse::Nanoseconds motionTimeAt(pulse::Nanoseconds clock_time) const;
   /// The addresses of all chips on a serial port.
   std::vector<int> addressesOn(const std::string& port) const;
   std::uint64_t newGroup() { return ++groups_; }
@@ -87,7 +91,7 @@ class Context : public AnswerSink {
   std::uint64_t newStart() { return ++starts_; }
 
   /// A turn begins.
-  void beginTurn(Outputs& outputs) { out = &outputs; }
+  void beginTurn(Outputs& outputs);
   /// All its commands are complete.
   void endTurn();
   /// A command to follow profiles, to be filled in this turn. The engine accepts all of them or
@@ -111,7 +115,15 @@ class Context : public AnswerSink {
     std::shared_ptr<std::vector<pulse::FollowMarks>> marks;
   };
 
+  /// How far the timeline has slid from a clock time on.
+  struct Slip {
+    pulse::Nanoseconds from = 0;
+    pulse::Nanoseconds slipped = 0;
+  };
+
   std::vector<FollowCommand> follow_commands_;  // those of this turn
+  std::deque<Slip> slips_;
+  pulse::Nanoseconds last_turn_ = 0;
   std::uint64_t groups_ = 0;
   std::uint64_t moves_ = 0;
   std::uint64_t jobs_ = 0;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "homing_kinds.h"
+#include "homing_to_flag.h"
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "profile/resting_count.h"
@@ -55,6 +56,10 @@ std::unique_ptr<Homing> Homing::make(Context& context, axis::AxisModel& axis, st
   switch (axis.config.homing->kind) {
     case config::HomingKind::kBlock:
       return std::make_unique<HomingToBlock>(context, axis, id, std::move(outcome));
+    case config::HomingKind::kFlag:
+    case config::HomingKind::kFlagCentre:
+    case config::HomingKind::kIndex:
+      return std::make_unique<HomingToFlag>(context, axis, id, std::move(outcome));
     case config::HomingKind::kDirect:
       return std::make_unique<HomingInPlace>(context, axis, id, std::move(outcome));
     case config::HomingKind::kLimit:
@@ -159,6 +164,7 @@ void Homing::step() {
     fail(axis_.fault.what());
     return onLook();
   }
+  if (phase_ != HomingPhase::kNone) observe();
   if (isHeld()) return;
   if (phase_ == HomingPhase::kNone) return start();
   if (context().now >= deadline_) return failNow(timeOver());

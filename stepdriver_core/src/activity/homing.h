@@ -58,6 +58,8 @@ class Homing : public Activity {
   virtual void start() = 0;
   /// A stroke has ended, other than by a fault or before it began.
   virtual void strokeEnded() = 0;
+  /// Something may have happened, also while the homing is held.
+  virtual void observe() {}
   /// Something may have happened in a stroke, or in a pause between two.
   virtual void look(bool /*stroke_has_ended*/) = 0;
   /// Clock time by which look() must be called.

@@ -15,7 +15,7 @@ std::string HomingToBlock::sensor() const {
 
 void HomingToBlock::start() {
   const auto& input = axis_.motor.lines().homing_input;
-  if (input && (axis_.readInput(input->line) != 0) == input->active) {
+  if (input && (axis_.readInput(input->signal.line) != 0) == input->signal.active) {
     return failNow(sensor() + " reports a block before the axis has moved");
   }
   approach(axis::HomingPhase::kSeeking);

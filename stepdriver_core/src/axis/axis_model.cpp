@@ -54,6 +54,15 @@ double AxisModel::jointAt(double motor_count) const {
   return motor_count - std::clamp(slack, 0.0, static_cast<double>(backlash()));
 }
 
+double AxisModel::jointAtTime(std::int64_t at) const {
+  const motor::MotionHistory::Part& part = motor.history().at(at);
+  if (!part.moved) return part.place - part.slack;
+  const double place = part.motion.made().stateAt(at).position.value();
+  if (backlash() == 0) return place;
+  const auto slack = motion::slackAt(*part.motion.plan(), at, backlash());
+  return slack ? place - *slack : jointAt(place);
+}
+
 motion::PathAxis AxisModel::pathAxis() const {
   motion::PathAxis facts;
   facts.name = config.name;

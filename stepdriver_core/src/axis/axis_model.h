@@ -81,6 +81,8 @@ class AxisModel {
   double plannedEnd() const;
   /// [microsteps] The position of the joint when the motor has moved to a count without a reversal.
   double jointAt(double motor_count) const;
+  /// [microsteps] Where the joint was at a motion time, by its plans. @pre Motor::watchMotions()
+  double jointAtTime(std::int64_t at) const;
   double positionNow() const { return positionOf(exactCount()); }
   /// A value with its unit, for messages.
   std::string show(double value, const char* per = "") const { return pathAxis().show(value, per); }

@@ -22,7 +22,8 @@ constexpr double kLongestDebounceMs = 1000.0;
 constexpr int kHighestOrder = 1000;
 
 // In the order of HomingKind.
-const std::vector<std::string> kKinds = {"limit", "block", "direct"};
+const std::vector<std::string> kKinds = {"limit", "flag",  "flag_centre",
+                                         "index", "block", "direct"};
 const std::vector<std::string> kEnds = {"min", "max"};
 
 /// Whether the trigger of the homing lies so far inside the soft limit at its end that the axis,
@@ -64,10 +65,11 @@ class HomingReader {
     homing_.issue(key, fmt::format("is {}, but must be {}", homing_.shown(key), wanted));
   }
   bool isLimit() const { return result_.kind == HomingKind::kLimit; }
+  bool isBlock() const { return result_.kind == HomingKind::kBlock; }
 
   void readMotion() {
     const bool has_end = isLimit() ? readSwitch() : readDirection();
-    if (result_.kind == HomingKind::kBlock) readBlock();
+    if (!isLimit()) readSensor();
     readSpeeds();
     readDistances(has_end);
     result_.timeout = homing_.number("timeout_s", {0.0, kLongestTime, true}, result_.timeout);
@@ -96,18 +98,34 @@ class HomingReader {
     return towards.has_value();
   }
 
-  void readBlock() {
-    result_.input = homing_.text("input", "");
-    bool has_faults = true;
-    for (std::size_t i = 0; i < config_.motors(); ++i) {
-      has_faults = has_faults && config_.motorAt(i).fault;
-    }
-    if (result_.input.empty() && !has_faults) {
-      homing_.contradiction("input",
-                            "is missing, but something must tell that the motor is "
-                            "blocked: a name of `inputs`, or pins/fault of each motor");
-    }
+  void readSensor() {
+    result_.input = isBlock() ? homing_.text("input", "") : homing_.text("input");
+    result_.flag = homing_.text("flag", "");
     result_.approaches = homing_.integer("approaches", 1, 2, result_.approaches);
+    const bool is_index = result_.kind == HomingKind::kIndex;
+    if (!is_index && homing_.has("flag")) {
+      homing_.contradiction("flag", "is given, but only an index comes after a flag");
+    }
+    if (!isBlock() && homing_.has("approaches")) {
+      homing_.contradiction("approaches", "is given, but only a block is approached twice");
+    }
+    if (is_index && config_.steps_per_round <= 0.0) {
+      homing_.contradiction("kind",
+                            "is \"index\", but steps_per_round is missing: an index comes "
+                            "once a turn of the motor");
+    }
+    if (isBlock() && result_.input.empty() && !hasFaultOutputs()) {
+      homing_.contradiction("input",
+                            "must be the name of an input that reports the block, because "
+                            "pins/fault of each motor isn't wired");
+    }
+  }
+
+  bool hasFaultOutputs() const {
+    for (std::size_t i = 0; i < config_.motors(); ++i) {
+      if (!config_.motorAt(i).fault) return false;
+    }
+    return true;
   }
 
   std::optional<double> readSpeed(const std::string& key, double highest, const std::string& what) {
@@ -128,9 +146,9 @@ class HomingReader {
         readSpeed(seek_key, units(config_.max_speed),
                   fmt::format("{}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
     result_.seek_speed = si(seek.value_or(0.0));
-    if (result_.kind == HomingKind::kBlock && result_.approaches == 1) return;
+    if (isBlock() && result_.approaches == 1) return;
     // The count stays correct at the switch only at a speed from which the motor stops at once. A
-    // motor that is blocked has stopped.
+    // motor that is blocked has stopped, and a flag is passed.
     const bool known = isLimit() && config_.steps_per_unit > 0.0 && config_.acceleration > 0.0;
     const double restart = known ? units(restartSpeed(config_)) : 0.0;
     const auto latch = readSpeed(latch_key, restart,
@@ -163,8 +181,9 @@ class HomingReader {
                                      upperBoundText(kFarthestTravel / steps)));
     }
     const auto final_position = homing_.findNumber(final_key, Range{}, Presence::kOptional);
-    const bool backs_off = result_.kind == HomingKind::kBlock && result_.approaches == 2;
-    const bool needs_pull_off = !homing_.has(final_key) || backs_off;
+    const bool backs_off = isBlock() && result_.approaches == 2;
+    const bool stops_there = isLimit() || isBlock();
+    const bool needs_pull_off = (stops_there && !homing_.has(final_key)) || backs_off;
     const auto pull_off =
         homing_.findNumber(pull_off_key, Range::notNegative(),
                            needs_pull_off ? Presence::kRequired : Presence::kOptional);
@@ -181,7 +200,7 @@ class HomingReader {
     if (final_position) result_.final_position = si(*final_position);
     const bool all_right = readOffset(false) && pull_off.has_value() == homing_.has(pull_off_key) &&
                            !too_far && final_position.has_value() == homing_.has(final_key) &&
-                           (pull_off || final_position);
+                           (pull_off || final_position || !stops_there);
     if (has_end && all_right) checkRest();
   }
 
@@ -241,6 +260,7 @@ class HomingReader {
     const std::string key = inUnit("final_position");
     const double position = *result_.final_position;
     checkWithinLimits(key, position);
+    if (!isLimit() && !isBlock()) return;
     const double beyond = result_.at_max ? position - result_.offset : result_.offset - position;
     if (beyond <= step()) return;
     mustBe(key, fmt::format("{} {}, which is {}", result_.at_max ? "at most" : "at least",
@@ -269,21 +289,21 @@ double restOf(const HomingConfig& homing) {
 
 void checkHomingInputs(const std::vector<AxisConfig>& axes, const std::vector<InputConfig>& inputs,
                        const std::string& name, std::vector<ConfigIssue>& issues) {
-  for (const AxisConfig& axis : axes) {
-    if (!axis.homing || axis.homing->input.empty()) continue;
-    const std::string& wanted = axis.homing->input;
-    const bool is_there = std::any_of(inputs.begin(), inputs.end(), [&](const InputConfig& input) {
-      return input.name == wanted;
-    });
-    if (is_there) continue;
-    std::vector<std::string> names;
-    names.reserve(inputs.size());
-    for (const InputConfig& input : inputs) names.push_back(input.name);
+  std::vector<std::string> names;
+  names.reserve(inputs.size());
+  for (const InputConfig& input : inputs) names.push_back(input.name);
+  const auto check = [&](const AxisConfig& axis, const char* key, const std::string& wanted) {
+    if (wanted.empty() || std::find(names.begin(), names.end(), wanted) != names.end()) return;
     issues.push_back(
-        {fmt::format("{}/{}/homing/input", name, axis.name),
+        {fmt::format("{}/{}/homing/{}", name, axis.name, key),
          fmt::format("is \"{}\", but must be the name of an input: {}", printable(wanted),
                      names.empty() ? "there is no `inputs`" : listText(names, "or")),
          true});
+  };
+  for (const AxisConfig& axis : axes) {
+    if (!axis.homing) continue;
+    check(axis, "input", axis.homing->input);
+    check(axis, "flag", axis.homing->flag);
   }
 }
 

@@ -180,6 +180,7 @@ class AxisWriter {
     if (homing.final_position) map[key("final_position")] = units(*homing.final_position);
     if (is_limit) map["debounce_ms"] = homing.debounce * 1e3;
     if (!homing.input.empty()) map["input"] = homing.input;
+    if (!homing.flag.empty()) map["flag"] = homing.flag;
     if (homing.kind == HomingKind::kBlock) map["approaches"] = homing.approaches;
     if (homing.latch_speed > 0.0) map[key("latch_speed") + "_s"] = units(homing.latch_speed);
     return map;

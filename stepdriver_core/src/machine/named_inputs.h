@@ -1,17 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "activity/context.h"
+#include "activity/debounced_input.h"
 #include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/machine/io_states.h"
 
 namespace stepdriver::machine {
 
-/// An input with a name: its level after bouncing. Edges say when something has changed, and only
-/// the level that was read says to what: a lost edge costs no more than the exact time.
+/// An input with a name.
 class NamedInput {
  public:
   /// @param line its index in the request.
@@ -24,20 +23,12 @@ class NamedInput {
   /// Something may have happened.
   void poll(const activity::Context& context);
   /// Clock time by which poll() must be called.
-  pulse::Nanoseconds due() const;
+  pulse::Nanoseconds due() const { return input_.due(); }
   /// Whether its level must be read until it has stayed.
-  bool isBouncing() const { return left_.has_value(); }
+  bool isBouncing() const { return input_.bouncesSince().has_value(); }
 
  private:
-  void noteChange(const activity::Context& context, bool has_changed);
-
-  config::InputConfig config_;
-  int line_;
-  std::optional<int> level_;                // as read last; empty: before begin()
-  pulse::Nanoseconds level_since_ = 0;      // when that was read first
-  std::optional<pulse::Nanoseconds> left_;  // when its level began to change
-  pulse::Nanoseconds quiet_since_ = 0;      // the latest change of its level after that
-  pulse::Nanoseconds polled_at_ = 0;
+  activity::DebouncedInput input_;
   InputState state_;
 };
 

@@ -81,13 +81,15 @@ Wiring::Wiring(const std::vector<config::AxisConfig>& axes, const MachineOptions
 
 void Wiring::connectHoming(const config::HomingConfig& homing, const MachineOptions& options,
                            std::size_t axis) {
+  motor::MotorLines& lines = motor_lines[axis];
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
     const config::InputConfig& input = options.inputs[i];
-    if (input.name != homing.input) continue;
-    motor_lines[axis].homing_input = pulse::Signal{named_inputs[i], input.line.active_level};
+    const motor::SensorLine line{{named_inputs[i], input.line.active_level}, input.debounce_ns};
+    if (input.name == homing.input) lines.homing_input = line;
+    if (input.name == homing.flag) lines.homing_flag = line;
   }
   if (homing.kind != config::HomingKind::kBlock) return;
-  channels[axis].block = motor_lines[axis].homing_input;
+  if (lines.homing_input) channels[axis].block = lines.homing_input->signal;
   channels[axis].block_is_fault = homing.input.empty();
 }
 

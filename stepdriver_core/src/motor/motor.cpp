@@ -34,8 +34,36 @@ Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int chan
 }
 
 void Motor::update(const pulse::ChannelState& state) {
-  state_ = state;
+  const pulse::ChannelState before = std::exchange(state_, state);
+  if (history_.isKept()) remember(before);
   motions_.update(state);
+}
+
+MotionHistory::Part Motor::restingPart() const {
+  MotionHistory::Part rest;
+  rest.from = state_.end_time;
+  rest.place = static_cast<double>(state_.count) + state_.between;
+  rest.slack = static_cast<double>(state_.slack);
+  return rest;
+}
+
+void Motor::watchMotions() {
+  MotionHistory::Part now = restingPart();
+  if (const Motion* motion = motions_.find(state_.following)) {
+    now.moved = true;
+    now.motion = motion->planned;
+    now.from = motion->planned.plan()->startNs();
+  }
+  history_.watch(std::move(now));
+}
+
+// The counts of another microstep mode are those from now on.
+void Motor::remember(const pulse::ChannelState& before) {
+  for (const Motion& motion : motions_.all()) {
+    if (motion.serial <= before.accepted || motion.serial > state_.accepted) continue;
+    history_.add({motion.planned.plan()->startNs(), true, motion.planned});
+  }
+  if (state_.ended != before.ended || state_.epoch != before.epoch) history_.add(restingPart());
 }
 
 motion::PlannedMotion Motor::shaped(motion::Profile plan) const {

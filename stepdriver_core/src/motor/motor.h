@@ -10,6 +10,7 @@
 #include "channel/channel_config.h"
 #include "channel/channel_state.h"
 #include "driver_pins.h"
+#include "motion_history.h"
 #include "motions.h"
 #include "motor_lines.h"
 #include "power.h"
@@ -63,6 +64,13 @@ class Motor {
   std::int64_t countOf(std::size_t motor) const {
     return is_shared_ ? state_.own : state_.count + state_.lags.at(motor);
   }
+
+  /// @name Where it was, see MotionHistory
+  /// @{
+  void watchMotions();
+  void unwatchMotions() { history_.unwatch(); }
+  const MotionHistory& history() const { return history_; }
+  /// @}
 
   /// @name The translators
   /// @{
@@ -130,6 +138,9 @@ class Motor {
   void pinsRestored();
 
  private:
+  MotionHistory::Part restingPart() const;
+  void remember(const pulse::ChannelState& before);
+
   /// An ENABLE line, and the part of this axis in it.
   struct EnableShare {
     int line = -1;
@@ -147,6 +158,7 @@ class Motor {
   const std::shared_ptr<const motion::InputShaper> shaper_;
   pulse::ChannelState state_;
   Motions motions_;
+  MotionHistory history_;
   std::uint64_t serial_ = 0;
   Power power_;
   Brake brake_;

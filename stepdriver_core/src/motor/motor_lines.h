@@ -28,13 +28,19 @@ struct ChipLines {
   int in_position = -1;
 };
 
+/// An input with a name that an axis uses, without being its owner.
+struct SensorLine {
+  pulse::Signal signal;
+  pulse::Nanoseconds debounce = 0;  ///< a level must stay for so long to count
+};
+
 /// The lines of an axis: those of its first motor, and all others.
 struct MotorLines : ChipLines {
   std::vector<ChipLines> twins;
   int brake = -1;
-  bool cw_ccw = false;  ///< `step` is CW, and `dir` is CCW
-  /// HomingConfig::input, which isn't a line of the axis alone.
-  std::optional<pulse::Signal> homing_input;
+  bool cw_ccw = false;                     ///< `step` is CW, and `dir` is CCW
+  std::optional<SensorLine> homing_input;  ///< of HomingConfig::input
+  std::optional<SensorLine> homing_flag;   ///< of HomingConfig::flag
 
   std::size_t motors() const { return 1 + twins.size(); }
   const ChipLines& motorAt(std::size_t index) const {

@@ -59,6 +59,7 @@ namespace stepdriver::setup {
 ///     pen: {fail_write_after: 10}  # writes; those after them fail. Default: none fails
 ///   inputs:
 ///     probe: {pressed: false, bounces: 0, bounce_ms: 0.2}
+///     home: {axis: x, from_mm: 20.0, to_mm: 30.0, every_mm: 0.0, hysteresis_mm: 0.0}
 /// @endcode
 ///
 /// @param reader of that map.

@@ -101,6 +101,26 @@ void reportBlock(const AxisConfig& axis, const std::vector<config::InputConfig>&
   }
 }
 
+/// Inputs that the carriage presses.
+void addFlags(const AxisConfig& axis, const std::vector<config::InputConfig>& inputs,
+              const SimulationConfig& config, sim::RigAxisSpec& spec) {
+  for (const config::InputConfig& input : inputs) {
+    const auto found = config.inputs.find(input.name);
+    if (found == config.inputs.end() || found->second.axis != axis.name) continue;
+    const SimulatedInput& simulated = found->second;
+    sim::SwitchSpec flag;
+    flag.line = input.line.line;
+    flag.active_level = input.line.active_level;
+    flag.position = simulated.from;
+    flag.end = simulated.to;
+    flag.every = simulated.every;
+    flag.hysteresis = simulated.hysteresis;
+    flag.bounces = simulated.bounces;
+    flag.bounce_ns = std::llround(simulated.bounce_ms * 1e6);
+    spec.flags.push_back(std::move(flag));
+  }
+}
+
 sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& simulated,
                            const std::vector<config::InputConfig>& inputs) {
   const AxisConfig axis = wired(configured, simulated.wiring);
@@ -160,6 +180,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<AxisConfig>& axes,
     for (std::size_t i = 0; i < axis.motors(); ++i) {
       const SimulatedAxis& simulated = simulatedOf(config, axis).ofMotor(axis.motorAt(i).motor);
       rig.push_back(rigAxisOf(motorAlone(axis, i), simulated, inputs));
+      if (i == 0) addFlags(axis, inputs, config, rig.back());
       rig.back().limits = motorLimits(axes, number);
       rig.back().motor = motorOf(axes, number, simulated.motor);
     }

@@ -1,7 +1,12 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <utility>
 
+#include "message_text.h"
 #include "setup/read_simulation.h"
 
 namespace stepdriver::setup {
@@ -175,7 +180,44 @@ void readOutputsOfRig(ConfigReader all, const std::vector<config::OutputConfig>&
   all.rejectUnknown();
 }
 
+/// What presses an input is in the units of its axis.
+void readFlagOfRig(ConfigReader& reader, const std::vector<config::AxisConfig>& axes,
+                   bool axes_are_right, SimulatedInput& own) {
+  const auto axis = reader.findText("axis", Presence::kOptional);
+  const auto found =
+      std::find_if(axes.begin(), axes.end(), [&](const auto& any) { return any.name == axis; });
+  if (axis && found == axes.end()) {
+    reader.issue("axis",
+                 fmt::format("is {}, but must be the name of an axis", reader.shown("axis")));
+  }
+  const bool is_known = axes_are_right && axis && found != axes.end();
+  const bool is_linear = !is_known || found->kind == config::Kind::kLinear;
+  const bool is_rotary = !is_known || found->kind == config::Kind::kRotary;
+  const auto length = [&](const std::string& what, const Range& range, double& value,
+                          Presence presence) {
+    for (const auto& [unit, may] : {std::pair("_mm", is_linear), std::pair("_deg", is_rotary)}) {
+      if (!may) continue;
+      const auto number = reader.findNumber(what + unit, range, presence);
+      if (number) value = *number;
+    }
+  };
+  const Presence places = is_known ? Presence::kRequired : Presence::kOptional;
+  length("from", Range{}, own.from, places);
+  length("to", Range{}, own.to, places);
+  length("every", Range::notNegative(), own.every, Presence::kOptional);
+  length("hysteresis", Range::notNegative(), own.hysteresis, Presence::kOptional);
+  if (!is_known) return;
+  own.axis = *axis;
+  if (own.from > own.to || (own.every != 0.0 && own.every <= own.to - own.from)) {
+    reader.issue("",
+                 fmt::format("is pressed from {} to {}, every {}: it must be from a lower place "
+                             "to a higher one, and again after more than that, or 0",
+                             roughText(own.from), roughText(own.to), roughText(own.every)));
+  }
+}
+
 void readInputsOfRig(ConfigReader all, const std::vector<config::InputConfig>& inputs,
+                     const std::vector<config::AxisConfig>& axes, bool axes_are_right,
                      SimulationConfig& config) {
   for (const config::InputConfig& input : inputs) {
     ConfigReader reader = all.map(input.name);
@@ -183,6 +225,7 @@ void readInputsOfRig(ConfigReader all, const std::vector<config::InputConfig>& i
     own.pressed = reader.boolean("pressed", own.pressed);
     own.bounces = reader.integer("bounces", 0, kMostBounces, own.bounces);
     own.bounce_ms = reader.number("bounce_ms", Range{0.0, kLongestBounceMs, true}, own.bounce_ms);
+    readFlagOfRig(reader, axes, axes_are_right, own);
     reader.rejectUnknown();
     all.allow(input.name);
   }
@@ -210,7 +253,7 @@ SimulationConfig readSimulation(ConfigReader reader, const std::vector<config::A
   }
   if (!axes.empty()) rigs.rejectUnknown();
   readOutputsOfRig(reader.map("outputs"), outputs, config);
-  readInputsOfRig(reader.map("inputs"), inputs, config);
+  readInputsOfRig(reader.map("inputs"), inputs, axes, axes_are_right, config);
   reader.rejectUnknown();
   return config;
 }

@@ -264,6 +264,296 @@ TEST_F(HomingToBlockTest, NeedsAnInputThatIsThere) {
   }
 }
 
+// ---- a flag ----
+
+// A flag from 20 to 30 mm, of which the edge at 20 mm counts on the way to max.
+config::AxisConfig flagAxis(HomingKind kind = HomingKind::kFlag) {
+  config::AxisConfig config = homingAxis();
+  config.homing->kind = kind;
+  config.homing->at_max = true;
+  config.homing->input = "flag";
+  config.homing->pull_off = 0.0;
+  return config;
+}
+
+class HomingToFlagTest : public HomingKinds {
+ protected:
+  struct Rig {
+    double start = 0.0;  // [mm]
+    double hysteresis = 0.0;
+    int bounces = 0;
+    bool has_flag = true;
+  };
+
+  void buildFlag(const config::AxisConfig& config, const Rig& rig) {
+    config::InputConfig flag = inputOf("flag");
+    flag.debounce_ns = 2'000'000;
+    build(config, {flag, inputOf("index")}, [&](sim::RigAxisSpec& spec) {
+      spec.start = rig.start;
+      sim::SwitchSpec contact;
+      contact.line = "io.flag";
+      contact.active_level = true;
+      contact.position = 20.0;
+      contact.end = 30.0;
+      contact.hysteresis = rig.hysteresis;
+      contact.bounces = rig.bounces;
+      contact.bounce_ns = 200'000;
+      if (rig.has_flag) spec.flags.push_back(contact);
+      // A turn of 40 mm: at -15 mm, 25 mm and 65 mm.
+      contact = sim::SwitchSpec{};
+      contact.line = "io.index";
+      contact.active_level = true;
+      contact.position = index_at;
+      contact.end = index_at + 0.1;
+      contact.every = 40.0;
+      spec.flags.push_back(contact);
+    });
+  }
+
+  /// Expects the axis homed. @return [steps] see errorOf()
+  double homed(double trigger, const std::string& what) {
+    const HomingResult result = x().home();
+    EXPECT_EQ(result.end, HomingEnd::kHomed) << what << ": " << result.message;
+    EXPECT_EQ(violationsOf(bench->report()), "") << what;
+    return errorOf(trigger);
+  }
+
+  /// The spread of the home position over random starts. @return [steps] by how much
+  double spreadOf(const config::AxisConfig& config, double trigger, const Rig& like) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> starts(-99.0, 99.0);
+    double least = 1e9;
+    double most = -1e9;
+    for (int i = 0; i < 1000; ++i) {
+      Rig rig = like;
+      rig.start = std::round(starts(random) * 80.0) / 80.0;
+      if (i == 1) rig.start = 100.0;  // on the endstop ahead
+      buildFlag(config, rig);
+      const double error = homed(trigger, "from " + std::to_string(rig.start));
+      if (HasFailure()) return 0.0;
+      least = std::min(least, error);
+      most = std::max(most, error);
+    }
+    RecordProperty("spread_in_thousandths_of_a_step", static_cast<int>(1e3 * (most - least)));
+    EXPECT_NEAR(most, 0.0, 1.0);
+    return most - least;
+  }
+
+  double index_at = 25.0;  // [mm]
+};
+
+TEST_F(HomingToFlagTest, TakesTheEdgeFromTheSameSideWhereverItStarts) {
+  for (const double start : {-99.0, 0.0, 20.0, 25.0, 30.0, 35.0, 99.0, 100.0}) {
+    buildFlag(flagAxis(), {start});
+    EXPECT_NEAR(homed(0.02, std::to_string(start)), 0.5, 0.51) << start;
+  }
+}
+
+TEST_F(HomingToFlagTest, FromAnyPlaceFindsTheSameOne) {
+  EXPECT_LE(spreadOf(flagAxis(), 0.02, {0.0, 0.3, 3}), 1.0);
+}
+
+TEST_F(HomingToFlagTest, FindsTheMiddleWhateverTheHysteresis) {
+  // The switch opens 0.3 mm beyond each edge.
+  EXPECT_LE(spreadOf(flagAxis(HomingKind::kFlagCentre), 0.025, {0.0, 0.3, 3}), 1.0);
+  buildFlag(flagAxis(HomingKind::kFlagCentre), {});
+  const double without = homed(0.025, "without");
+  buildFlag(flagAxis(HomingKind::kFlagCentre), {0.0, 2.0});
+  EXPECT_NEAR(homed(0.025, "with"), without, 1e-6);
+}
+
+TEST_F(HomingToFlagTest, AFlagOnARotaryAxisNeedsNoEndstop) {
+  config::AxisConfig config = flagAxis();
+  config.endstop_min.reset();
+  config.endstop_max.reset();
+  buildFlag(config, {50.0});
+  // Beyond the flag: without an endstop to turn at, it isn't found within the travel.
+  const HomingResult result = x().home();
+  EXPECT_EQ(result.message,
+            "x isn't homed: the input flag didn't become active within max_travel, 0.3 m; it "
+            "stands at 0.3 m");
+  std::vector<sim::RigAxisSpec> specs;
+  build(config, {inputOf("flag")}, [](sim::RigAxisSpec& spec) {
+    spec.start = 50.0;
+    sim::SwitchSpec contact;
+    contact.line = "io.flag";
+    contact.active_level = true;
+    contact.position = 20.0;
+    contact.end = 30.0;
+    contact.every = 100.0;  // a turn
+    spec.flags.push_back(contact);
+  });
+  EXPECT_NEAR(homed(0.12, "turning"), 0.5, 0.51);
+}
+
+TEST_F(HomingToFlagTest, SaysThatThereIsNoFlag) {
+  buildFlag(flagAxis(), {0.0, 0.0, 0, false});
+  const HomingResult result = x().home();
+  EXPECT_EQ(result.end, HomingEnd::kFailed);
+  EXPECT_NE(result.message.find("the min endstop was met, and the input flag didn't become active "
+                                "between the two"),
+            std::string::npos)
+      << result.message;
+}
+
+TEST_F(HomingToFlagTest, SaysThatTheFlagIsStuck) {
+  buildFlag(flagAxis(), {});
+  bench->rig.stickInput("flag", true, bench->clock.now());
+  const HomingResult stuck = x().home();
+  EXPECT_EQ(stuck.end, HomingEnd::kFailed);
+  EXPECT_NE(stuck.message.find("the min endstop was met while leaving"), std::string::npos)
+      << stuck.message;
+  config::AxisConfig config = flagAxis();
+  config.homing->max_travel = 0.05;
+  buildFlag(config, {});
+  bench->rig.stickInput("flag", true, bench->clock.now());
+  EXPECT_NE(x().home().message.find("the input flag didn't become inactive within max_travel"),
+            std::string::npos);
+}
+
+TEST_F(HomingToFlagTest, SaysThatTheFlagBreaksBeforeTheLatch) {
+  config::AxisConfig config = flagAxis();
+  config.homing->max_travel = 0.05;
+  buildFlag(config, {});
+  const HomingResult result = x().home([&] {
+    if (x().state().homing == axis::HomingPhase::kLatching) {
+      bench->rig.stickInput("flag", false, bench->clock.now());
+    }
+    return false;
+  });
+  EXPECT_NE(result.message.find("the input flag didn't become active again within max_travel"),
+            std::string::npos)
+      << result.message;
+}
+
+TEST_F(HomingToFlagTest, TheTimeoutNamesTheFlag) {
+  config::AxisConfig config = flagAxis();
+  config.homing->timeout = 0.2;
+  buildFlag(config, {});
+  EXPECT_NE(x().home().message.find("the input flag didn't become active within timeout_s, 0.2 s"),
+            std::string::npos);
+}
+
+TEST_F(HomingToFlagTest, IsHeldAtAnyMomentAndFindsTheSamePlace) {
+  buildFlag(flagAxis(), {});
+  const double undisturbed = homed(0.02, "undisturbed");
+  for (int period = 20; period < 100; period += 8) {
+    buildFlag(flagAxis(), {});
+    int looks = 0;
+    const HomingResult result = x().home([&] {
+      if (++looks % period == 0) {
+        bench->machine->hold();
+        bench->machine->advance(0.3);
+        bench->machine->resume();
+      }
+      return false;
+    });
+    EXPECT_EQ(result.end, HomingEnd::kHomed) << period << ": " << result.message;
+    EXPECT_NEAR(errorOf(0.02), undisturbed, 1e-3) << period;
+  }
+}
+
+TEST_F(HomingToFlagTest, EndsWithAStopADisableAndAnEmergencyStopInAnyPhase) {
+  const std::vector<std::function<void()>> ends{[this] { x().stop(); },
+                                                [this] { x().enable(false); },
+                                                [this] { bench->machine->emergencyStop(); }};
+  for (const auto phase : {axis::HomingPhase::kSeeking, axis::HomingPhase::kBackingOff,
+                           axis::HomingPhase::kLatching}) {
+    for (const auto& end : ends) {
+      buildFlag(flagAxis(), {});
+      bool done = false;
+      const HomingResult result = x().home([&] {
+        if (!done && x().state().homing == phase) {
+          done = true;
+          end();
+        }
+        return false;
+      });
+      EXPECT_TRUE(done);
+      EXPECT_EQ(result.end, HomingEnd::kFailed) << axis::nameOf(phase);
+      EXPECT_FALSE(x().state().homed);
+      EXPECT_FALSE(x().state().moving);
+    }
+  }
+}
+
+TEST_F(HomingToFlagTest, KnowsThePlaceOfTheJointWithABacklash) {
+  config::AxisConfig config = flagAxis();
+  config.backlash = 0.001;
+  build(config, {inputOf("flag")}, [](sim::RigAxisSpec& spec) {
+    sim::SwitchSpec contact;
+    contact.line = "io.flag";
+    contact.active_level = true;
+    contact.position = 20.0;
+    contact.end = 30.0;
+    spec.flags.push_back(contact);
+  });
+  // The rig has no backlash: on the way to max the joint is a whole one behind.
+  const HomingResult result = x().home();
+  EXPECT_EQ(result.end, HomingEnd::kHomed) << result.message;
+  const double joint = bench->pulses() * kStep - x().state().slack;
+  const double trigger = 0.02 - 0.5 * kStep - 0.001;
+  EXPECT_NEAR(x().state().position - config.homing->offset, joint - trigger, 1e-9);
+}
+
+// ---- an index ----
+
+TEST_F(HomingToFlagTest, TakesTheIndexAfterTheFlag) {
+  config::AxisConfig config = flagAxis(HomingKind::kIndex);
+  config.homing->input = "index";
+  config.homing->flag = "flag";
+  config.steps_per_round = 3200.0;  // 40 mm
+  index_at = 38.0;                  // 18 mm from the flag's edge
+  EXPECT_LE(spreadOf(config, 0.038, {0.0, 0.3, 3}), 1.0);
+  EXPECT_EQ(x().home().message.find("may be taken"), std::string::npos);
+}
+
+TEST_F(HomingToFlagTest, WarnsIfTheIndexIsNearTheFlagsEdge) {
+  config::AxisConfig config = flagAxis(HomingKind::kIndex);
+  config.homing->input = "index";
+  config.homing->flag = "flag";
+  config.steps_per_round = 3200.0;
+  index_at = 22.0;
+  buildFlag(config, {});
+  HomingResult result = x().home();
+  EXPECT_EQ(result.end, HomingEnd::kHomed);
+  EXPECT_NE(result.message.find("the index index comes 5 % of a turn from the edge of the input "
+                                "flag"),
+            std::string::npos)
+      << result.message;
+  index_at = 18.8;  // the next one comes at 58.8 mm
+  buildFlag(config, {});
+  result = x().home();
+  EXPECT_NEAR(errorOf(0.0588), 0.5, 0.51);
+  EXPECT_NE(result.message.find("comes 3 % of a turn"), std::string::npos) << result.message;
+}
+
+TEST_F(HomingToFlagTest, SaysThatNoIndexComesWithinATurn) {
+  config::AxisConfig config = flagAxis(HomingKind::kIndex);
+  config.homing->input = "index";
+  config.homing->flag = "flag";
+  config.steps_per_round = 3200.0;
+  buildFlag(config, {});
+  bench->rig.stickInput("index", false, bench->clock.now());
+  const HomingResult result = x().home();
+  EXPECT_NE(result.message.find(
+                "the index index didn't come within a turn of the edge of the input flag"),
+            std::string::npos)
+      << result.message;
+}
+
+TEST_F(HomingToFlagTest, AnIndexAloneIsTheNextOne) {
+  config::AxisConfig config = flagAxis(HomingKind::kIndex);
+  config.homing->input = "index";
+  config.steps_per_round = 3200.0;
+  for (const double start : {-14.0, 0.0, 24.9, 25.0, 25.1}) {
+    buildFlag(config, {start});
+    EXPECT_NEAR(homed(0.025, std::to_string(start)), 0.5, 0.51) << start;
+  }
+  buildFlag(config, {26.0});
+  EXPECT_NEAR(homed(0.065, "26"), 0.5, 0.51);
+}
+
 // ---- the final position ----
 
 TEST_F(HomingKinds, StandsAtTheFinalPositionWithANumberOfItsOwn) {

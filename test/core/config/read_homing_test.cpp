@@ -228,8 +228,8 @@ TEST(ReadHoming, ABlockNeedsSomethingThatReportsIt) {
   drop(axis, "homing/input");
   EXPECT_EQ(issuesOfX(axis),
             lineOfX("homing/input",
-                    "is missing, but something must tell that the motor is blocked: a name of "
-                    "`inputs`, or pins/fault of each motor"));
+                    "must be the name of an input that reports the block, because pins/fault of "
+                    "each motor isn't wired"));
 }
 
 TEST(ReadHoming, ABlockHasNoSwitchAndNoDebounce) {
@@ -269,6 +269,28 @@ TEST(ReadHoming, ADirectHomingIsANumber) {
   drop(axis, "max_position_mm");
   drop(axis, "homing/offset_mm");
   EXPECT_EQ(issuesOfX(axis), lineOfX("homing/offset_mm", "is missing; it must be a number"));
+}
+
+TEST(ReadHoming, ReadsAFlagAndAnIndex) {
+  ConfigValue axis = blockAxis();
+  drop(axis, "homing/pull_off_mm");
+  put(axis, "homing/latch_speed_mm_s", 40.0);
+  for (const auto& [kind, wanted] :
+       {std::pair("flag", HomingKind::kFlag), std::pair("flag_centre", HomingKind::kFlagCentre),
+        std::pair("index", HomingKind::kIndex)}) {
+    put(axis, "homing/kind", kind);
+    EXPECT_EQ(readX(axis).homing->kind, wanted);
+    EXPECT_EQ(readX(axis).homing->input, "stall");
+    EXPECT_EQ(readX(axis).homing->pull_off, 0.0);
+  }
+  put(axis, "homing/flag", "home");
+  EXPECT_EQ(readX(axis).homing->flag, "home");
+  put(axis, "homing/kind", "flag");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/flag", "is given, but only an index comes after a flag"));
+  drop(axis, "homing/flag");
+  drop(axis, "homing/input");
+  EXPECT_EQ(issuesOfX(axis), lineOfX("homing/input", "is missing; it must be a string"));
 }
 
 }  // namespace

@@ -100,7 +100,10 @@ enum class IdleAction { kDisable, kSleep };
 
 /// What tells an axis where it is when it is homed.
 enum class HomingKind {
-  kLimit,   ///< the place where one of its endstop switches closes
+  kLimit,       ///< the place where one of its endstop switches closes
+  kFlag,        ///< the edge of a flag, a switch that it passes on both sides
+  kFlagCentre,  ///< the middle of a flag
+  kIndex,   ///< an index pulse, which comes once a turn of the motor, after a flag's edge or alone
   kBlock,   ///< the place where its motor is blocked
   kDirect,  ///< nothing: it is where it stands
 };
@@ -111,10 +114,12 @@ struct HomingConfig {
   HomingKind kind = HomingKind::kLimit;
   /// The switch is the max endstop, or of other kinds, the axis moves towards max; false: min.
   bool at_max = false;
-  /// The input with a name that is active, if only for an instant, when the motor is blocked; only
-  /// for kBlock. Empty: the fault outputs of its drivers are.
+  /// The input with a name that tells of a flag, an index or a block. It may be active for an
+  /// instant only, but not that of a flag. Empty, of a kBlock only: the fault outputs of its
+  /// drivers tell of it.
   std::string input;
-  int approaches = 1;        ///< of a kBlock: 2 for a second one at latch_speed
+  std::string flag;    ///< of a kIndex, the input of the flag before it; empty: the next one counts
+  int approaches = 1;  ///< of a kBlock: 2 for a second one at latch_speed
   double seek_speed = 0.0;   ///< [unit/s] the speed of the first approach to the trigger point
   double latch_speed = 0.0;  ///< [unit/s] off the switch, and back to the trigger point
   double pull_off = 0.0;     ///< [unit] from the trigger point to the final position

@@ -75,6 +75,12 @@ struct SimulatedInput {
   bool pressed = false;    ///< at the start
   int bounces = 0;         ///< extra on-off pairs after each change
   double bounce_ms = 0.2;  ///< [ms] from one bounce edge to the next
+  /// The axis whose carriage presses it between two places; empty: only a hand does.
+  std::string axis;
+  double from = 0.0;        ///< [mm|deg]
+  double to = 0.0;          ///< [mm|deg]
+  double every = 0.0;       ///< [mm|deg] and again so often; 0: once
+  double hysteresis = 0.0;  ///< [mm|deg] it is released this far outside of that
 };
 
 /// The configuration of the simulated rig.
