@@ -88,6 +88,16 @@ void addMarks(const Goal& goal, axis::MoveResult& result) {
   result.message += goal.marks->text();
 }
 
+// What its position would have switched on the rest of the way.
+void addLeftOut(const Context& context, const axis::AxisModel& axis, double target,
+                axis::MoveResult& result) {
+  for (const auto& left : context.motion_outputs.leftOut(axis, axis.exactCount(), target)) {
+    result.marks_not_made += left.places;
+    result.message += fmt::format("; {} wasn't switched at {} places that weren't reached",
+                                  left.output, left.places);
+  }
+}
+
 axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis, const Goal& goal,
                             axis::MoveEnd end, const std::string& why) {
   axis::MoveResult result;
@@ -98,6 +108,9 @@ axis::MoveResult resultWith(const Context& context, const axis::AxisModel& axis,
                        ? fmt::format("{} reached {}", axis.name(), axis.showPlace(result.position))
                        : standsAt(axis, goal, why) + axis.abruptText();
   addMarks(goal, result);
+  if (end != axis::MoveEnd::kReached && goal.target) {
+    addLeftOut(context, axis, static_cast<double>(*goal.target), result);
+  }
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "compare_plan.h"
 #include "context.h"
 #include "message_text.h"
+#include "profile/resting_count.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::activity {
@@ -158,6 +159,26 @@ void MotionOutputs::supervise(Context& context, const std::string& why_safe,
       end(context, i);
     }
   }
+}
+
+std::vector<MotionOutputs::LeftOut> MotionOutputs::leftOut(const axis::AxisModel& axis,
+                                                           double joint, double target) const {
+  std::vector<LeftOut> all;
+  const bool up = target > joint;
+  const std::int64_t from = motion::restingCount(joint);
+  const std::int64_t to = motion::restingCount(target);
+  for (const Output& output : outputs_) {
+    if (!output.compared || output.compared->compare.axis != axis.name()) continue;
+    if (output.kept.empty() || !output.kept.back().track) continue;
+    const auto& edges = output.kept.back().track->edges;
+    const auto is_left_out = [&](const pulse::CompareEdge& edge) {
+      return edge.at > std::min(from, to) && edge.at <= std::max(from, to) &&
+             (up ? edge.up : edge.down) != pulse::CompareAction::kNothing;
+    };
+    const auto places = std::count_if(edges.begin(), edges.end(), is_left_out);
+    if (places > 0) all.push_back({output.config.name, static_cast<std::uint64_t>(places)});
+  }
+  return all;
 }
 
 void MotionOutputs::orderCompare(Context& context, std::size_t number, Output& output,

@@ -82,6 +82,13 @@ class MotionOutputs {
                const SharedCall& call);
   /// Whose position switches an output; empty: none does.
   const std::string& comparedAxis(std::size_t output) const;
+  /// What the end of a motion leaves out.
+  struct LeftOut {
+    std::string output;
+    std::uint64_t places = 0;  ///< at which the output would have been switched
+  };
+  /// @param joint, target [microsteps] where an axis stands, and where it was to go.
+  std::vector<LeftOut> leftOut(const axis::AxisModel& axis, double joint, double target) const;
   /// Orders what has changed: positions that can be trusted now, or not any more.
   /// @param why_safe why all outputs must be in their safe states; empty: they needn't.
   /// @param may whether the places of an axis mean something now.

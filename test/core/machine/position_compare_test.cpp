@@ -400,6 +400,26 @@ TEST_F(PositionCompareTest, AtTheEndOfAMotionButNotOfAHoldOrAStop) {
   EXPECT_EQ(switchedOn().size(), 1U);
 }
 
+TEST_F(PositionCompareTest, AStopSaysWhatItHasCutOff) {
+  machine().setPositionCompare("camera", every(0.002, 0.01, 0.09, 1e-3));
+  machine().setPositionCompare("valve", cam(0.08, 0.085));
+  const axis::Move first = bench->axis("x").moveTo(0.1);
+  while (switchedOn().size() < 10) advance(1e-3);
+  bench->axis("x").stop();
+  const axis::MoveResult result = bench->axis("x").wait(first);
+  EXPECT_EQ(result.end, axis::MoveEnd::kStopped);
+  const std::size_t left = 41 - switchedOn().size();
+  EXPECT_GT(left, 20U);
+  EXPECT_EQ(result.marks_not_made, left + 2);
+  EXPECT_NE(result.message.find("; camera wasn't switched at " + std::to_string(left) +
+                                " places that weren't reached; valve wasn't switched at 2 places"),
+            std::string::npos)
+      << result.message;
+  const axis::MoveResult rest = bench->axis("x").wait(bench->axis("x").moveTo(0.1));
+  EXPECT_EQ(rest.marks_not_made, 0U);
+  EXPECT_EQ(switchedOn().size(), 41U);
+}
+
 TEST_F(PositionCompareTest, APulseThatCannotBeMadeIsCounted) {
   machine().setPositionCompare("camera", at({0.01}, 0.05));
   // Over the place and back within the pulse.
