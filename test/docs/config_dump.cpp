@@ -153,6 +153,9 @@ std::string dump(const ros_node::NodeConfig& config) {
   for (const auto& rig : config.simulation.axes) dump.add(rig.second);
   for (const auto& output : config.outputs) dump.add(output);
   for (const auto& input : config.inputs) dump.add(input);
+  for (const auto& board : config.boards) {
+    dump.all(board.name, board.port, board.baud, board.ahead, board.step_error, board.reset);
+  }
   for (const auto& output : config.simulation.outputs) dump.add(output.second);
   for (const auto& input : config.simulation.inputs) dump.add(input.second);
   return dump.text();

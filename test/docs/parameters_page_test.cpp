@@ -94,6 +94,7 @@ emergency_stop: {pin: Z, active_level: high}
 heartbeat: {pin: Y}
 motor_power: {pin: W, on_ms: 5.0, feedback: {pin: V, active_level: low}}
 outputs: {x: {pin: U}}
+boards: {x: {port: /dev/x}}
 inputs: {x: {pin: T, active_level: low}}
 simulation: {axes: {x: {}}, outputs: {x: {}}, inputs: {x: {axis: x, from_mm: 1.0, to_mm: 2.0}}}
 axes:
@@ -261,6 +262,7 @@ std::vector<Parameter> parametersOf(const Node& node) {
   for (const Parameter& parameter : parametersUnder("Outputs and inputs with a name", "")) {
     all.push_back(parameter);
   }
+  for (const Parameter& parameter : parametersUnder("Boards", "")) all.push_back(parameter);
   for (const auto& [heading, prefix] :
        {std::pair("An axis", "axes/x/"), std::pair("The simulated rig", "simulation/")}) {
     for (const Parameter& parameter : parametersUnder(heading, prefix)) {
@@ -306,7 +308,7 @@ std::map<std::string, std::set<std::string>> mapsOf(const std::vector<Parameter>
       map += (map.empty() ? "" : "/") + key;
     }
   }
-  for (const char* names : {"axes", "simulation/axes", "wheels", "outputs", "inputs",
+  for (const char* names : {"axes", "simulation/axes", "wheels", "outputs", "inputs", "boards",
                             "simulation/outputs", "simulation/inputs"}) {
     maps.erase(names);
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
@@ -50,9 +51,15 @@ bool isLine(const std::string& line) {
   const auto colon = line.rfind(':');
   if (colon == std::string::npos) return true;
   const std::string offset = line.substr(colon + 1);
+  if (colon == 0 || offset.empty()) return false;
+  // A pin of a board, as "mcu:gpio12". Whoever knows the boards checks its name.
+  if (std::isalpha(static_cast<unsigned char>(offset[0])) != 0) {
+    return std::all_of(offset.begin(), offset.end(), [](unsigned char letter) {
+      return std::isalnum(letter) != 0 || letter == '_' || letter == '.';
+    });
+  }
   // Nine digits exceed the number of lines of any chip, and fit into an int.
-  return colon > 0 && !offset.empty() && offset.size() <= 9 &&
-         offset.find_first_not_of("0123456789") == std::string::npos;
+  return offset.size() <= 9 && offset.find_first_not_of("0123456789") == std::string::npos;
 }
 
 std::optional<std::string> readLineName(ConfigReader& reader, const std::string& key,

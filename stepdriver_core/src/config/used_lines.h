@@ -23,6 +23,12 @@ class UsedLines {
   /// @param on that level; empty if it isn't known.
   void addEnable(const std::string& key, const std::string& line, std::optional<bool> on);
 
+  /// Calls this for each line, with the key that has named it first.
+  template <typename Use>
+  void forEach(const Use& use) const {
+    for (const auto& [line, user] : users_) use(line, user.key);
+  }
+
  private:
   struct User {
     std::string key;

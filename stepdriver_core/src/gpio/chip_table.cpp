@@ -32,7 +32,10 @@ constexpr ErrorWords kErrors[] = {
     {ENOMEM, "ENOMEM, out of memory"},
     {ENOTTY, "ENOTTY, the kernel doesn't know this call"},
     {ENXIO, "ENXIO, the line has no interrupt"},
+    {EREMOTEIO, "EREMOTEIO, the firmware of the board has shut down"},
     {EPERM, "EPERM, operation not permitted"},
+    {EPROTO, "EPROTO, the board hasn't made the steps that it was told"},
+    {ETIME, "ETIME, the steps came too late for the board: the computer was busy for too long"},
     {ETIMEDOUT, "ETIMEDOUT, the chip doesn't answer"},
     {524, "ENOTSUPP, the chip's driver can't do this"},
 };

@@ -19,6 +19,7 @@
 #include "machine_axis.h"
 #include "message_text.h"
 #include "nanoseconds.h"
+#include "port/port_backend.h"
 #include "pulse/measure.h"
 #include "pulse/pulse_engine.h"
 #include "read_options.h"
@@ -57,7 +58,12 @@ class Machine::Impl {
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
     lines_ = backend.request(wiring.outputs, wiring.inputs);
-    if (options.measure && clock.realtime()) {
+    if (auto* ports = dynamic_cast<pulse::PortBackend*>(&backend)) {
+      port_ = ports->makePort(*lines_, clock,
+                              pulse::PulseEngine::lanesOf(wiring.channels, wiring.shared));
+    }
+    // What a port of its own plays doesn't depend on the times of this computer.
+    if (options.measure && clock.realtime() && !port_) {
       capability_ = pulse::measureCapability(*lines_, clock, wiring.channels, options.realtime);
       capability_->late_steps = options.late_steps;
       const std::string why = options.enforce ? whyNotInRealtime(configs, *capability_) : "";
@@ -69,9 +75,7 @@ class Machine::Impl {
     for (std::size_t i = 0; i < wiring.inputs.size(); ++i) {
       names_.inputs.push_back(lines_->inputName(static_cast<int>(i)));
     }
-    engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock, wiring.channels,
-                                                   nanoseconds(options.max_lateness),
-                                                   wiring.emergency_stop, wiring.shared);
+    engine_ = makeEngine(wiring, options);
     engine_->switchOutputs(wiring.switchedOutputs(options));
     controller_ = std::make_unique<Controller>(
         configs, wiring.motor_lines, names_, wiring.emergency_stop, options.emergency_disable,
@@ -122,6 +126,18 @@ class Machine::Impl {
     } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the caller of shutdown() learns it
     }
     shell_->stop();
+  }
+
+  std::unique_ptr<pulse::PulseEngine> makeEngine(const Wiring& wiring,
+                                                 const MachineOptions& options) {
+    const pulse::Nanoseconds max_lateness = nanoseconds(options.max_lateness);
+    if (port_) {
+      return std::make_unique<pulse::PulseEngine>(*port_, *lines_, clock_, wiring.channels,
+                                                  max_lateness, wiring.emergency_stop,
+                                                  wiring.shared);
+    }
+    return std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring.channels, max_lateness,
+                                                wiring.emergency_stop, wiring.shared);
   }
 
   AxisId idOf(const std::string& name) const {
@@ -526,7 +542,7 @@ class Machine::Impl {
   }
 
   pulse::Clock& clock_;
-  // Destroyed in this order: axes, shell, controller, engine, recorder, lines.
+  // Destroyed in this order: axes, shell, controller, engine, recorder, port, lines.
   Disposer disposer_;
   const std::vector<config::OutputConfig> outputs_;
   std::mutex io_mutex_;  // guards on_io_
@@ -534,6 +550,7 @@ class Machine::Impl {
   std::shared_ptr<gpio::Lines> lines_;
   axis::LineNames names_;
   std::optional<pulse::Capability> capability_;
+  std::unique_ptr<pulse::StepPort> port_;  // empty: the engine writes the lines
   std::unique_ptr<FlightRecorder> recorder_;
   std::unique_ptr<pulse::PulseEngine> engine_;
   std::unique_ptr<Controller> controller_;

@@ -100,6 +100,9 @@ class StepPort {
     /// A condition of the port's own has stopped the channel: no open step of it will be played,
     /// and all are given back. Only for ports with a horizon.
     virtual void stopped(std::size_t channel, const Stop& stop) = 0;
+    /// Nobody knows how many of the steps that were given back have gone out: the motor's position
+    /// isn't known any more. Told before stopped() or failed().
+    virtual void doubtful(std::size_t /*channel*/) {}
     /// A line of a channel could not be written. A step that was to go out may have gone out, and
     /// counts as given back; or the lane hasn't turned. All steps that are still open are given
     /// back too.

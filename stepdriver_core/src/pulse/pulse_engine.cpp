@@ -658,6 +658,12 @@ void PulseEngine::stopped(std::size_t channel, const StepPort::Stop& stop) {
   object(axis, {stop.reason, stop.failure}, clock_.now());
 }
 
+// Like a stop at a speed that the motor can't stop from: its position isn't valid afterwards.
+void PulseEngine::doubtful(std::size_t channel) {
+  channels_[channel]->kin->unmade = true;
+  channels_[channel]->is_fast = true;
+}
+
 void PulseEngine::failed(std::size_t channel, const LineFailure& failure, Nanoseconds now) {
   fail(*channels_[channel], failure, now);
 }

@@ -232,6 +232,7 @@ class PulseEngine : private StepPort::Listener {
   void ready(std::size_t channel) override;
   void givenBack(std::size_t channel, std::size_t steps) override;
   void stopped(std::size_t channel, const StepPort::Stop& stop) override;
+  void doubtful(std::size_t channel) override;
   void failed(std::size_t channel, const LineFailure& failure, Nanoseconds now) override;
 
   // Ends.

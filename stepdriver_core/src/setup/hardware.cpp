@@ -1,5 +1,8 @@
 #include "stepdriver_core/setup/hardware.h"
 
+#include <fmt/format.h>
+
+#include "boards.h"
 #include "machine/read_options.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
@@ -27,9 +30,16 @@ Hardware::Hardware(const MachineConfig& config, const std::string& name) {
   } else {
     gpio_ = gpio::makeLibgpiodBackend();
   }
+  board_count_ = config.boards.size();
+  if (board_count_ != 0) boards_ = makeBoards(config.boards, backend(), clock(), !!simulation_);
 }
 
-gpio::Backend& Hardware::backend() { return simulation_ ? simulation_->backend() : *gpio_; }
+Hardware::~Hardware() = default;
+
+gpio::Backend& Hardware::backend() {
+  if (boards_) return *boards_;
+  return simulation_ ? simulation_->backend() : *gpio_;
+}
 
 pulse::Clock& Hardware::clock() {
   if (simulation_) return simulation_->clock();
@@ -37,8 +47,12 @@ pulse::Clock& Hardware::clock() {
 }
 
 std::string Hardware::description() const {
-  if (simulation_) return "the simulated rig";
-  return "GPIO lines (libgpiod " + gpio::libgpiodVersion() + ")";
+  const std::string boards = board_count_ == 0
+                                 ? ""
+                                 : fmt::format(" and {} board{} with Klipper's firmware",
+                                               board_count_, board_count_ == 1 ? "" : "s");
+  if (simulation_) return "the simulated rig" + boards;
+  return "GPIO lines (libgpiod " + gpio::libgpiodVersion() + ")" + boards;
 }
 
 }  // namespace stepdriver::setup

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "config/read_kinematics.h"
 #include "machine/read_options.h"
 #include "pulse/cpu_latency.h"
+#include "setup/read_boards.h"
 #include "setup/read_machine_config.h"
 #include "setup/read_simulation.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
@@ -58,6 +60,38 @@ void readRecorder(ConfigReader reader, RecorderConfig& recorder) {
   recorder.folder = machine::readAbsolutePath(reader, "folder", recorder.folder, "the default");
   recorder.keep = reader.integer("keep", 1, kMostRecordings, recorder.keep);
   reader.rejectUnknown();
+}
+
+// What a line on a board can't be, and whether there is such a board.
+void checkBoards(const ConfigReader& reader, const MachineConfig& config,
+                 const config::UsedLines& used) {
+  std::vector<ConfigIssue>& issues = reader.issues();
+  std::string names;
+  for (const BoardConfig& board : config.boards) names += (names.empty() ? "" : ", ") + board.name;
+  const auto board_of = [&](const std::string& line) {
+    const auto colon = line.find(':');
+    return std::any_of(config.boards.begin(), config.boards.end(), [&](const BoardConfig& board) {
+      return line.substr(0, colon) == board.name;
+    });
+  };
+  used.forEach([&](const std::string& line, const std::string& key) {
+    const auto colon = line.rfind(':');
+    const bool is_pin = colon != std::string::npos && line[colon + 1] > '9';
+    if (!is_pin || board_of(line)) return;
+    issues.push_back({key, fmt::format("is \"{}\", but there is no board {} ({}: {})", line,
+                                       line.substr(0, colon), reader.fullName("boards"),
+                                       names.empty() ? "none" : names)});
+  });
+  const auto refuse = [&](const std::string& key, const std::string& line) {
+    if (line.find(':') == std::string::npos || !board_of(line)) return;
+    issues.push_back({reader.fullName(key),
+                      fmt::format("is \"{}\", but it can't be on a board: its times would be "
+                                  "those of the line to the board",
+                                  line)});
+  };
+  if (config.heartbeat) refuse("heartbeat/pin", config.heartbeat->line);
+  for (const auto& output : config.outputs) refuse("outputs/" + output.name + "/pin", output.line);
+  for (const auto& input : config.inputs) refuse("inputs/" + input.name + "/pin", input.line.line);
 }
 
 }  // namespace
@@ -112,6 +146,8 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
   config.outputs = config::readOutputs(reader, used, axes_are_right ? &config.axes : nullptr);
   config.inputs = config::readInputs(reader, used);
   config::checkHomingInputs(config.axes, config.inputs, reader.fullName("axes"), reader.issues());
+  config.boards = readBoards(reader.map("boards"));
+  checkBoards(reader, config, used);
   ConfigReader simulation = reader.map("simulation");
   if (simulation.has("emergency_stop") && !config.emergency_stop) {
     simulation.contradiction("emergency_stop", fmt::format("is {}, but {} is missing",
@@ -126,6 +162,13 @@ MachineConfig readMachineConfig(ConfigReader& reader) {
     reader.contradiction("heartbeat",
                          fmt::format("is given, but {} is 0: it would make the time of the rig "
                                      "run on at rest too; leave it out, or give another speed",
+                                     simulation_speed));
+  }
+  if (!config.boards.empty() && config.backend == GpioBackend::kSimulated &&
+      config.simulation.speed == 0.0) {
+    reader.contradiction("boards",
+                         fmt::format("are given, but {} is 0: they would make the time of the rig "
+                                     "run on at rest too; leave them out, or give another speed",
                                      simulation_speed));
   }
   if (config.backend == GpioBackend::kLibgpiod && !config.simulation.trace.empty()) {

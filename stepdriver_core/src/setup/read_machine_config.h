@@ -54,6 +54,7 @@ namespace stepdriver::setup {
 ///   memory_mb: 16.0              # for edges, at most
 ///   folder: ""                   # absolute path of its files; empty: the program decides
 ///   keep: 20                     # recordings in that folder
+/// boards: {...}                  # see readBoards()
 /// simulation: {...}              # see readSimulation(); only a simulated machine reads it
 /// axes: {...}                    # see config::readAxes()
 /// kinematics:                    # optional: axes that share motors

@@ -377,7 +377,11 @@ bool FakeBoard::watches(const std::string& name, const std::vector<std::uint32_t
   if (name == "endstop_home") {
     endstop->homing = arguments[3] != 0;
     endstop->hits = 0;
-    endstop->due = endstop->homing ? std::max(widened(arguments[1]), now_) : kNoTick;
+    endstop->due = endstop->homing ? widened(arguments[1]) : kNoTick;
+    if (endstop->due < now_) {
+      shutDown("Timer too close");
+      return true;
+    }
     endstop->sample_ticks = arguments[2];
     endstop->sample_count = arguments[3];
     endstop->rest_ticks = arguments[4];

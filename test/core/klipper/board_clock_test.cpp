@@ -6,10 +6,11 @@
 #include <cstdint>
 #include <random>
 
+#include "port/klipper/transport.h"
+
 namespace stepdriver::klipper {
 namespace {
 
-constexpr Nanoseconds kMillisecond = 1'000'000;
 constexpr Nanoseconds kSecond = 1'000'000'000;
 
 /// A board's clock that is too fast, and answers that take their time.

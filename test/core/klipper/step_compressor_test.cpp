@@ -121,8 +121,8 @@ TEST(StepCompressor, NeedsOneRunForAConstantVelocityAndForAnEvenlyChangingInterv
   }
 }
 
-// A ramp from rest is a root, which no run follows for long: up to 89,000 steps/s, a step takes 0.15
-// of a command with an error of a tick.
+// A ramp from rest is a root, which no run follows for long: up to 89,000 steps/s, a step takes
+// 0.15 of a command with an error of a tick.
 TEST(StepCompressor, TakesAFewStepsOfASteepRampWithACommand) {
   std::vector<std::int64_t> ticks;
   for (int i = 1; i <= 20'000; ++i) {

@@ -15,7 +15,6 @@ namespace stepdriver::klipper {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-constexpr Nanoseconds kMillisecond = 1'000'000;
 
 /// A line with a delay that loses, changes and doubles bytes, and stands still now and then.
 class Line {

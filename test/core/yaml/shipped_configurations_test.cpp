@@ -47,10 +47,10 @@ TEST_P(ShippedConfiguration, LosesNoStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shipped, ShippedConfiguration,
-                         testing::Values("a4988.yaml", "camera.yaml", "corexy.yaml", "drv8825.yaml",
-                                         "gantry.yaml", "pen_plotter.yaml", "plotter.yaml",
-                                         "rotary_axis.yaml", "tb6600.yaml", "tmc2209.yaml",
-                                         "two_axes.yaml", "wheel.yaml"));
+                         testing::Values("a4988.yaml", "board.yaml", "camera.yaml", "corexy.yaml",
+                                         "drv8825.yaml", "gantry.yaml", "pen_plotter.yaml",
+                                         "plotter.yaml", "rotary_axis.yaml", "tb6600.yaml",
+                                         "tmc2209.yaml", "two_axes.yaml", "wheel.yaml"));
 
 }  // namespace
 }  // namespace stepdriver::yaml

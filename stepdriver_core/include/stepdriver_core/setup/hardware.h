@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 
@@ -24,6 +25,7 @@ class Hardware {
   /// @throw ConfigError if the rig's trace can't be written, or as machine::Machine.
   /// @throw GpioError if the backend is libgpiod and stepdriver was built without it.
   explicit Hardware(const MachineConfig& config, const std::string& name = "");
+  ~Hardware();
 
   gpio::Backend& backend();
   pulse::Clock& clock();
@@ -39,6 +41,8 @@ class Hardware {
   // If there is no simulation:
   std::unique_ptr<gpio::Backend> gpio_;
   pulse::SteadyClock clock_;
+  std::unique_ptr<gpio::Backend> boards_;  // around the others; empty: there are no boards
+  std::size_t board_count_ = 0;
 };
 
 }  // namespace stepdriver::setup

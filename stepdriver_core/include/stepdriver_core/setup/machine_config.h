@@ -28,6 +28,16 @@ struct RecorderConfig {
   int keep = 20;            ///< recordings in that folder
 };
 
+/// A board with Klipper's firmware, which plays the pulses of motors ahead of time.
+struct BoardConfig {
+  std::string name;         ///< its lines are `name:pin`
+  std::string port;         ///< path of its serial port; on the rig it isn't opened
+  int baud = 250'000;       ///< only of ports that aren't USB
+  double ahead = 0.05;      ///< [s] how long before its time a step is sent
+  double step_error = 0.0;  ///< [s] how far a step may be from its time; 0: a tick of its clock
+  bool reset = false;       ///< whether a board that another program has configured is reset
+};
+
 /// The configuration of a machine. The node reads it from its parameters, and yaml::readFile() from
 /// a file.
 struct MachineConfig {
@@ -46,6 +56,7 @@ struct MachineConfig {
   std::optional<config::MotorPowerConfig> motor_power;  ///< see machine::MachineOptions
   std::vector<config::OutputConfig> outputs;            ///< in the order of the file
   std::vector<config::InputConfig> inputs;
+  std::vector<BoardConfig> boards;
   std::string state_file;  ///< see machine::MachineOptions
   RecorderConfig recorder;
 

@@ -69,7 +69,8 @@ void BoardClock::estimate() {
   // A second between the answers is needed before they say more of the frequency than its nominal
   // value does; the weights are relative.
   const double spread = std::sqrt(variance / weights);
-  double slope = spread > 0.25 ? covariance / variance : 0.0;
+  knows_frequency_ = spread > 0.25;
+  double slope = knows_frequency_ ? covariance / variance : 0.0;
   slope = std::clamp(slope, -kMostDrift * nominal_, kMostDrift * nominal_);
   frequency_ = nominal_ + slope;
   time_ = newest.time;
@@ -84,6 +85,13 @@ void BoardClock::estimate() {
   }
   const double deviation = std::sqrt(residuals / weights) / nominal_ * 1e9;
   uncertainty_ = quickest + static_cast<Nanoseconds>(std::ceil(deviation));
+}
+
+Nanoseconds BoardClock::uncertaintyAt(Nanoseconds time) const {
+  constexpr double kQuartz = 200e-6;
+  if (knows_frequency_) return uncertainty_;
+  return uncertainty_ +
+         std::llround(kQuartz * std::abs(static_cast<double>(time - points_.front().time)));
 }
 
 std::int64_t BoardClock::estimateAt(Nanoseconds time) const {

@@ -8,7 +8,7 @@ namespace {
 
 // A board answers within a millisecond, a USB bus and a busy computer within some more. The timeout
 // doubles each time, as on any line that may be overloaded.
-constexpr Nanoseconds kShortestTimeout = 10'000'000;
+constexpr Nanoseconds kShortestTimeout = 5'000'000;
 constexpr Nanoseconds kFirstTimeout = 50'000'000;
 constexpr Nanoseconds kLongestTimeout = 400'000'000;
 // So much fits that no command is queued without room in practice: a second of a fast link.
@@ -122,6 +122,10 @@ void Transport::hear(const FrameReader::Frame& frame, Nanoseconds now) {
 void Transport::acknowledge(std::uint64_t count, Nanoseconds now) {
   const Block& last = block(acknowledged_ + count - 1);
   if (!last.repeated) noteRoundTrip(now - last.sent);
+  // The line works: what was doubled for the blocks before isn't right for the next ones.
+  if (knows_round_trip_) {
+    timeout_ = std::clamp(round_trip_ + 4 * variation_, kShortestTimeout, kLongestTimeout);
+  }
   acknowledged_ += count;
   waits_since_ = now;
   times_out_ = acknowledged_ == sent_ ? kNever : now + timeout_;
@@ -129,14 +133,14 @@ void Transport::acknowledge(std::uint64_t count, Nanoseconds now) {
 
 void Transport::noteRoundTrip(Nanoseconds time) {
   // Jacobson and Karels, as TCP does: the mean, and four times the mean deviation.
-  if (round_trip_ == 0 && variation_ == 0) {
+  if (!knows_round_trip_) {
+    knows_round_trip_ = true;
     round_trip_ = time;
     variation_ = time / 2;
   } else {
     variation_ += (std::abs(time - round_trip_) - variation_) / 4;
     round_trip_ += (time - round_trip_) / 8;
   }
-  timeout_ = std::clamp(round_trip_ + 4 * variation_, kShortestTimeout, kLongestTimeout);
 }
 
 void Transport::repeatAll(Nanoseconds now) {

@@ -13,6 +13,7 @@ namespace stepdriver::klipper {
 
 using pulse::kNever;
 using pulse::Nanoseconds;
+constexpr Nanoseconds kMillisecond = 1'000'000;
 
 /// Carries commands to a board, each exactly once and in order, over a line that loses, changes or
 /// delays bytes. Pure: bytes in, bytes out, and times.
@@ -104,6 +105,7 @@ class Transport {
   Nanoseconds waits_since_ = 0;
   Nanoseconds timeout_;
   Nanoseconds times_out_ = kNever;
+  bool knows_round_trip_ = false;
   Nanoseconds round_trip_ = 0;
   Nanoseconds variation_ = 0;
   Figures figures_;

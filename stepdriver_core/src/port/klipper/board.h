@@ -1,0 +1,149 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "port/klipper/board_clock.h"
+#include "port/klipper/link.h"
+#include "port/klipper/messages.h"
+#include "port/klipper/transport.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::klipper {
+
+/// A board: its firmware, its configuration, its clock, and the line to it.
+///
+///     Board board("mcu", std::move(link), clock, {});
+///     board.identify();                             // what is it?
+///     const auto oid = board.addStepper("gpio2", "gpio3", false, 24);
+///     board.configure();                            // it has these objects from now on
+///     board.send(Command::kStepperGetPosition, {oid});
+///     board.serve(now);                             // whenever due() is over, and after send()
+///
+/// The functions until configure() wait for answers, and throw. All others don't wait, don't throw,
+/// and are for the thread that serves the board; failure() and reason() are for any thread.
+class Board {
+ public:
+  struct Options {
+    /// A board that another program has configured is reset instead of refused.
+    bool resets_foreign = false;
+  };
+
+  /// Is told what the board says, within serve().
+  class Listener {
+   public:
+    virtual ~Listener() = default;
+    virtual void heard(const Heard& heard, Nanoseconds now) = 0;
+    /// The board can't be used any more, see reason().
+    virtual void lost(Nanoseconds now) = 0;
+  };
+
+  /// @param name of the configuration. @param clock outlives this.
+  Board(std::string name, std::unique_ptr<Link> link, pulse::Clock& clock, Options options);
+
+  /// @name At the start
+  /// @{
+  /// @throw BoardError if nothing answers, or if the firmware isn't one that can be used.
+  void identify();
+  /// @throw BoardError if the board has no such pin; it lists some that it has.
+  std::uint32_t pin(const std::string& name) const;
+  /// [ticks] At least this time.
+  std::uint32_t ticksOf(Nanoseconds time) const;
+
+  /// @name Objects of the board; each returns its number
+  /// @{
+  std::uint32_t addStepper(std::uint32_t step_pin, std::uint32_t dir_pin, bool inverted,
+                           std::uint32_t pulse_ticks);
+  std::uint32_t addTrsync();
+  /// @param pull_up whether the board pulls it up.
+  std::uint32_t addEndstop(std::uint32_t pin, bool pull_up);
+  /// @param level from the configuration on, and whenever the firmware shuts down.
+  /// @param watched if the host doesn't confirm the other level within kWatchdog, the firmware
+  ///   shuts down.
+  std::uint32_t addOutput(std::uint32_t pin, bool level, bool watched);
+  /// @}
+
+  static constexpr Nanoseconds kWatchdog = 2'000'000'000;
+
+  /// Gives the board its objects, unless it has exactly these from before, and reads its clock.
+  /// @throw BoardError
+  void configure();
+  /// Asks and waits for the answer of this object. @throw BoardError
+  Heard ask(Command command, std::initializer_list<std::uint32_t> arguments, Answer answer);
+  /// @}
+
+  /// @param listener nullptr: nobody.
+  void listen(Listener* listener) { listener_ = listener; }
+  void send(Command command, std::initializer_list<std::uint32_t> arguments);
+  /// Sets an output from addOutput().
+  void setOutput(std::uint32_t oid, bool level);
+  /// Reads, tells the listener, and writes what can be written.
+  void serve(Nanoseconds now);
+  Nanoseconds due(Nanoseconds now) const;
+  /// Sends what is left, for a short time. For the end, when nobody serves it any more.
+  void flush();
+
+  BoardClock& boardClock() { return *board_clock_; }
+  std::uint16_t moveCount() const { return move_count_; }
+  const std::string& name() const { return name_; }
+  const std::string& version() const { return dictionary_.version(); }
+  const std::string& mcu() const { return mcu_; }
+  Transport::Figures figures() const { return transport_.figures(); }
+
+  /// errno of what is wrong with it; 0: nothing is.
+  int failure() const { return failure_.load(std::memory_order_acquire); }
+  /// In words, if there is one: "its firmware has shut down: Timer too close".
+  std::string reason() const;
+
+ private:
+  struct Output {
+    std::uint32_t oid = 0;
+    bool level = false;
+    bool at_shutdown = false;
+    bool watched = false;
+  };
+
+  void connect();
+  std::optional<Heard> exchange(Answer answer, std::optional<std::uint32_t> oid);
+  void resetConfiguration();
+  void add(Command command, std::initializer_list<std::uint32_t> arguments);
+  void readClock();
+  void receive(Nanoseconds now);
+  void transmit(Nanoseconds now);
+  void hear(const Heard& heard, Nanoseconds now);
+  void keepTime(Nanoseconds now);
+  void keepOutputs(Nanoseconds now);
+  void fail(int error, const std::string& reason, Nanoseconds now);
+
+  const std::string name_;
+  const std::unique_ptr<Link> link_;
+  pulse::Clock& clock_;
+  const Options options_;
+  Listener* listener_ = nullptr;
+  Transport transport_;
+  Dictionary dictionary_;
+  std::string mcu_;
+  std::optional<Messages> messages_;
+  std::unique_ptr<BoardClock> board_clock_;
+  std::vector<Message> objects_;
+  std::uint32_t oids_ = 0;
+  std::vector<Output> outputs_;
+  std::uint16_t move_count_ = 0;
+  std::optional<Nanoseconds> clock_asked_;
+  Nanoseconds clock_due_ = 0;
+  int clocks_ = 0;
+  Nanoseconds outputs_due_ = 0;
+  std::optional<Heard> awaited_;  // at the start
+  std::vector<std::uint8_t> identity_;
+  std::atomic<int> failure_{0};
+  std::array<char, 200> reason_{};
+};
+
+}  // namespace stepdriver::klipper
