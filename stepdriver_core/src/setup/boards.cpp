@@ -1,5 +1,7 @@
 #include "boards.h"
 
+#include <fmt/format.h>
+
 #include <map>
 #include <string>
 #include <utility>
@@ -9,6 +11,7 @@
 #include "port/klipper/tty_link.h"
 #include "sim/fake_board.h"
 #include "simulated_link.h"
+#include "stepdriver_core/setup/driver_check.h"
 
 namespace stepdriver::setup {
 namespace {
@@ -66,6 +69,25 @@ class RigLink : public klipper::Link {
 };
 
 }  // namespace
+
+std::vector<DriverFinding> checkBoards(const std::vector<BoardConfig>& boards) {
+  std::vector<DriverFinding> findings;
+  for (const BoardConfig& config : boards) {
+    try {
+      pulse::SteadyClock clock;
+      klipper::Board board(
+          config.name, std::make_unique<klipper::TtyLink>(config.name, config.port, config.baud),
+          clock, {});
+      board.identify();
+      findings.push_back(
+          {true, fmt::format("{}: {} at {:g} MHz, firmware {}", config.name, board.mcu(),
+                             board.boardClock().nominal() * 1e-6, board.version())});
+    } catch (const Error& error) {
+      findings.push_back({false, error.what()});
+    }
+  }
+  return findings;
+}
 
 std::unique_ptr<gpio::Backend> makeBoards(const std::vector<BoardConfig>& boards,
                                           gpio::Backend& base, pulse::Clock& clock,

@@ -55,6 +55,7 @@ class Check {
 
   int run() {
     section("Configuration: " + options_.config, configurationText(config_));
+    if (real_ && !config_.boards.empty()) return reportBoards();
     reportLines();
     reportDrivers();
     const SystemFacts facts = systemFacts();
@@ -73,6 +74,22 @@ class Check {
     if (exit_code_ != kExitGood) return;
     exit_code_ = exit_code;
     verdict_ = verdict;
+  }
+
+  // They play the pulses: what this computer can sustain doesn't matter.
+  int reportBoards() {
+    const auto findings = setup::checkBoards(config_.boards);
+    section("Boards", driversText(findings));
+    const bool are_right =
+        std::all_of(findings.begin(), findings.end(),
+                    [](const setup::DriverFinding& finding) { return finding.is_right; });
+    verdict_ = "every board answers; its lines are checked when the node starts.";
+    if (!are_right) note(kExitLines, "a board can't be used (see above).");
+    if (options_.move || options_.wiring) {
+      note(kExitUsage, "--move and --wiring don't work with boards, so nothing was moved.");
+    }
+    print(fmt::format("{}: {}\n", exit_code_ == kExitGood ? "Good" : "NOT GOOD", verdict_));
+    return exit_code_;
   }
 
   void reportLines() {

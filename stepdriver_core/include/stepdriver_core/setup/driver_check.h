@@ -5,6 +5,7 @@
 
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/lines.h"
+#include "stepdriver_core/setup/machine_config.h"
 
 namespace stepdriver::setup {
 
@@ -31,5 +32,11 @@ struct DriverFinding {
 /// @endcode
 std::vector<DriverFinding> checkDrivers(const std::vector<config::AxisConfig>& axes,
                                         gpio::Backend& backend, bool wiring);
+
+/// Asks the boards which firmware they have, while no machine uses them. Nothing is configured, and
+/// nothing moves.
+///
+/// @return for each board one finding: "mcu: rp2040 at 12 MHz, firmware v0.12.0".
+std::vector<DriverFinding> checkBoards(const std::vector<BoardConfig>& boards);
 
 }  // namespace stepdriver::setup

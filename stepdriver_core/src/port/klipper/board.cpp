@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 
 namespace stepdriver::klipper {
 namespace {

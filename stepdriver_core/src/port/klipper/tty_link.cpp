@@ -12,7 +12,7 @@
 #include <cerrno>
 
 #include "port/klipper/dictionary.h"
-#include "stepdriver_core/gpio/chip_table.h"
+#include "gpio/chip_table.h"
 
 extern "C" int ioctl(int file, unsigned long request, ...) noexcept;
 
