@@ -240,6 +240,7 @@ class BoardBackend::HeldLines final : public gpio::Lines {
              "boards, or of none");
     }
     if (lane.dir_steps) refuse(step.name, "is a CW input, which a board can't drive");
+    if (lane.block) refuse(step.name, "is on a board, where no homing can go to a block");
     if (lane.both_edges) refuse(step.name, "steps at both edges, which isn't done on a board");
     Board& board = *step.board;
     channel.pulse_ticks = board.ticksOf(std::max(lane.step_high, lane.dir_hold));

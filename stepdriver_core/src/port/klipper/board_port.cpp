@@ -126,8 +126,8 @@ BoardPort::~BoardPort() {
   for (Board* board : boards_) board->listen(nullptr);
 }
 
-void BoardPort::begin(std::size_t channel, const Squaring& squaring) {
-  tracks_[channel]->still = squaring.still;
+void BoardPort::begin(std::size_t channel, const Manner& manner) {
+  tracks_[channel]->still = manner.still;
 }
 
 std::size_t& BoardPort::entriesOf(const Board& board) {

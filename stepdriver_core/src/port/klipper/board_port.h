@@ -68,7 +68,7 @@ class BoardPort final : public pulse::StepPort {
   ~BoardPort() override;
 
   Nanoseconds horizon() const override { return options_.horizon; }
-  void begin(std::size_t channel, const Squaring& squaring) override;
+  void begin(std::size_t channel, const Manner& manner) override;
   /// The steppers turn by themselves: the lanes accept either direction.
   void aim(std::size_t /*channel*/, int /*direction*/) override {}
   void put(const Step& step) override;

@@ -11,8 +11,8 @@
 
 #include <cerrno>
 
-#include "port/klipper/dictionary.h"
 #include "gpio/chip_table.h"
+#include "port/klipper/dictionary.h"
 
 extern "C" int ioctl(int file, unsigned long request, ...) noexcept;
 
