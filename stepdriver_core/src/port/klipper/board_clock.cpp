@@ -12,6 +12,9 @@ constexpr Nanoseconds kConvergence = 2'000'000'000;
 // A quartz and a RC oscillator are within this of their nominal frequency; what is beyond is a
 // wrong answer, and not a clock.
 constexpr double kMostDrift = 0.05;
+// The frequencies of boards deviate by about this from their nominal ones: a quartz by less, a
+// ceramic resonator by more.
+constexpr double kDeviation = 1e-3;
 // [ns] Weights of answers with a shorter round trip don't grow any more.
 constexpr double kShortestHalf = 1'000.0;
 
@@ -66,12 +69,13 @@ void BoardClock::estimate() {
     covariance += weight * off * (deviation_of(point) - mean_tick);
     variance += weight * off * off;
   }
-  // A second between the answers is needed before they say more of the frequency than its nominal
-  // value does; the weights are relative.
-  const double spread = std::sqrt(variance / weights);
-  knows_frequency_ = spread > 0.25;
-  double slope = knows_frequency_ ? covariance / variance : 0.0;
-  slope = std::clamp(slope, -kMostDrift * nominal_, kMostDrift * nominal_);
+  // What is known before any answer weighs as much as an answer about the frequency with that
+  // deviation: few answers that took long say less than the nominal value.
+  const double information = variance + 1e-18 / (kDeviation * kDeviation);
+  const double slope =
+      std::clamp(covariance / information, -kMostDrift * nominal_, kMostDrift * nominal_);
+  frequency_deviation_ = 1e-9 / std::sqrt(information);
+  mean_time_ = newest.time + std::llround(mean_time * 1e9);
   frequency_ = nominal_ + slope;
   time_ = newest.time;
   whole_ = newest.tick;
@@ -88,10 +92,8 @@ void BoardClock::estimate() {
 }
 
 Nanoseconds BoardClock::uncertaintyAt(Nanoseconds time) const {
-  constexpr double kQuartz = 200e-6;
-  if (knows_frequency_) return uncertainty_;
-  return uncertainty_ +
-         std::llround(kQuartz * std::abs(static_cast<double>(time - points_.front().time)));
+  const double off = std::abs(static_cast<double>(time - mean_time_));
+  return uncertainty_ + std::llround(frequency_deviation_ * off);
 }
 
 std::int64_t BoardClock::estimateAt(Nanoseconds time) const {

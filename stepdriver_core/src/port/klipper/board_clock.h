@@ -51,8 +51,8 @@ class BoardClock {
   /// [ns] How far off the estimate may be: half of the quickest round trip among the answers, and
   /// the deviation of the others from the line.
   Nanoseconds uncertainty() const { return uncertainty_; }
-  /// The same at a time far from the last answer: as long as the frequency is only its nominal
-  /// value, the estimate gets worse by what a quartz may be off.
+  /// The same at a time far from the answers, which gets worse by what isn't known of the
+  /// frequency.
   Nanoseconds uncertaintyAt(Nanoseconds time) const;
 
  private:
@@ -74,7 +74,8 @@ class BoardClock {
   double tick_ = 0.0;
   std::int64_t whole_ = 0;  // is added to tick_
   Nanoseconds uncertainty_ = 0;
-  bool knows_frequency_ = false;
+  double frequency_deviation_ = 0.0;
+  Nanoseconds mean_time_ = 0;  // of the answers
   // Conversions from this time on.
   bool settles_ = true;
   bool is_newer_ = false;  // there is an estimate that they don't lead to yet

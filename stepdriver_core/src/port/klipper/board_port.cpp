@@ -62,13 +62,11 @@ struct BoardPort::Track {
   bool stopping = false;                      // it was told to stop, or has stopped
   bool has_stopped = false;
   std::uint32_t stopped_by = kTakenBack;
-  std::int64_t stopped_at = 0;
   bool fails = false;  // the stop is a failure, and not an end of steps
   int error_number = 0;
-  Nanoseconds asked = 0;      // when it was asked for positions
-  bool awaits = false;        // the answer
-  Nanoseconds moved = 0;      // when its count has changed
-  std::int64_t heard_at = 0;  // tick before which the answers were made
+  Nanoseconds asked = 0;  // when it was asked for positions
+  bool awaits = false;    // the answer
+  Nanoseconds moved = 0;  // when its count has changed
 };
 
 class BoardPort::Ear : public Board::Listener {
@@ -341,7 +339,6 @@ void BoardPort::heard(Board& board, const Heard& heard, Nanoseconds now) {
       }
       track.has_stopped = true;
       track.stopped_by = track.armed ? heard.arguments[2] : kTakenBack;
-      track.stopped_at = board.boardClock().widened(heard.arguments[3], now);
       if (!track.stopping) {
         stop(channel, now);
       } else {
@@ -392,10 +389,17 @@ std::size_t BoardPort::playedBy(const Track& track, std::size_t motor, std::int6
   return played;
 }
 
+// No step after this can have been played by now: only a motor that goes back and forth needs that.
+std::int64_t BoardPort::latestTick(const Track& track, Nanoseconds now) const {
+  const BoardClock& board_clock = track.config.board->boardClock();
+  constexpr int kDeviations = 3;
+  return board_clock.estimateAt(now + kMillisecond + kDeviations * board_clock.uncertaintyAt(now));
+}
+
 void BoardPort::tellPlayed(std::size_t channel, Nanoseconds now) {
   Track& track = *tracks_[channel];
   const BoardClock& board_clock = track.config.board->boardClock();
-  const std::int64_t until = board_clock.estimateAt(now + board_clock.uncertainty()) + track.error;
+  const std::int64_t until = latestTick(track, now);
   std::size_t played = track.open.size();
   for (std::size_t i = 0; i < track.steppers.size(); ++i) {
     bool fits = false;
@@ -407,9 +411,10 @@ void BoardPort::tellPlayed(std::size_t channel, Nanoseconds now) {
     track.moved = now;
     return;
   }
-  // Steps are due, and it doesn't make them: its board has stopped it, and nobody has heard that.
-  const bool is_due =
-      !track.open.empty() && track.open.front().tick < board_clock.estimateAt(now - kStalled);
+  // Steps were due long before it was asked, and it hasn't made them: its board has stopped it, and
+  // nobody has heard that.
+  const bool is_due = !track.open.empty() &&
+                      track.open.front().tick < board_clock.estimateAt(track.asked - kStalled);
   if (is_due && now - track.moved > kStalled) stop(channel, now);
 }
 
@@ -437,10 +442,7 @@ void BoardPort::close(std::size_t channel, std::size_t played, Nanoseconds now) 
 // The motors have stopped, and have said where.
 void BoardPort::settle(std::size_t channel, Nanoseconds now) {
   Track& track = *tracks_[channel];
-  const BoardClock& board_clock = track.config.board->boardClock();
-  const std::int64_t until = track.stopped_at + track.error +
-                             board_clock.estimateAt(board_clock.uncertainty()) -
-                             board_clock.estimateAt(0);
+  const std::int64_t until = latestTick(track, now);
   std::vector<std::size_t> played(track.steppers.size());
   bool all_fit = true;
   for (std::size_t i = 0; i < track.steppers.size(); ++i) {

@@ -99,6 +99,7 @@ class BoardPort final : public pulse::StepPort {
   void stop(std::size_t channel, Nanoseconds now);
   void askPositions(Track& track, Nanoseconds now);
   std::size_t playedBy(const Track& track, std::size_t motor, std::int64_t until, bool& fits) const;
+  std::int64_t latestTick(const Track& track, Nanoseconds now) const;
   void tellPlayed(std::size_t channel, Nanoseconds now);
   void settle(std::size_t channel, Nanoseconds now);
   void close(std::size_t channel, std::size_t played, Nanoseconds now);
