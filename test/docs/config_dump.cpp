@@ -28,16 +28,18 @@ class Dump {
     all(power.line, power.active_level, power.on_ns, power.off_delay_ns, power.feedback,
         power.feedback_timeout_ns);
   }
-  void add(const config::FaultPin& fault) { all(fault.line, fault.bias, fault.ramps); }
+  void add(const config::FaultPin& fault) { all(fault.line, fault.bias); }
   void add(const config::InPositionPin& in_position) {
     all(in_position.line, in_position.bias, in_position.timeout);
   }
   void add(const config::BrakeConfig& brake) {
     all(brake.line, brake.release_level, brake.release_ns, brake.engage_ns);
   }
+  void add(const config::StallConfig& stall) { all(stall.threshold, stall.current, stall.phase); }
   void add(const config::TmcConfig& tmc) {
     all(tmc.port, tmc.baud, tmc.address, tmc.sense_resistor, tmc.run_current, tmc.hold_current,
-        tmc.hold_delay, static_cast<int>(tmc.mode), tmc.interpolate);
+        tmc.hold_delay, static_cast<int>(tmc.mode), tmc.spread_cycle_above, tmc.interpolate,
+        tmc.stall);
   }
   void add(const config::HomingConfig& homing) {
     all(static_cast<int>(homing.kind), homing.at_max, homing.input, homing.flag, homing.approaches,
@@ -65,7 +67,7 @@ class Dump {
   }
   void add(const config::MotorConfig& motor) {
     all(motor.motor, motor.driver, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,
-        motor.in_position, motor.offset, motor.tmc);
+        motor.fault_ramps, motor.in_position, motor.offset, motor.tmc);
   }
   void add(const config::Kinematics& kinematics) {
     for (const std::string& name : kinematics.axes) add(name);

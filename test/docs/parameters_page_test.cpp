@@ -176,22 +176,31 @@ axes:
                       "base")};
 }
 
-/// An axis whose chip is on a UART.
-Node uartChip() {
-  return {"uart_chip", false, readNode,
-          yaml::parse(R"(
+Node registerChip(const char* name, const std::string& driver, const std::string& place) {
+  const std::string axis = R"(
 gpio: {backend: simulated}
 axes:
   x:
-    driver: tmc2209
+    driver: DRIVER
     pins: {step: A, dir: B}
-    tmc: {port: /dev/serial0, address: 0, sense_resistor_mohm: 110.0, run_current_a: 0.8}
+    tmc: {PLACE, sense_resistor_mohm: 110.0, run_current_a: 0.8}
     microsteps: 16
     steps_per_mm: 80.0
     max_speed_mm_s: 100.0
     acceleration_mm_s2: 500.0
-)",
-                      "base")};
+)";
+  return {name, false, readNode,
+          yaml::parse(replaced(replaced(axis, "DRIVER", driver), "PLACE", place), "base")};
+}
+
+/// An axis whose chip is on a UART.
+Node uartChip() { return registerChip("uart_chip", "tmc2209", "port: /dev/serial0, address: 0"); }
+
+/// An axis whose chip is on SPI.
+Node spiChip() { return registerChip("spi_chip", "tmc5160", "spi: /dev/spidev0.0"); }
+
+bool isRegisterChip(const Node& node) {
+  return std::string(node.name) == "uart_chip" || std::string(node.name) == "spi_chip";
 }
 
 /// An axis that is homed to a block.
@@ -256,6 +265,14 @@ std::vector<Parameter> parametersOf(const Node& node) {
   if (std::string(node.name) == "base") return parametersUnder("The base's node", "");
   if (std::string(node.name) == "gantry") return parametersUnder("Several motors", "axes/x/");
   if (std::string(node.name) == "uart_chip") return parametersUnder("A chip on a UART", "axes/x/");
+  if (std::string(node.name) == "spi_chip") {
+    std::vector<Parameter> all = parametersUnder("A chip on SPI", "axes/x/");
+    for (const Parameter& parameter : parametersUnder("A chip on a UART", "axes/x/")) {
+      const std::string key = split(parameter.key, '/').back();
+      if (key != "port" && key != "baud" && key != "address") all.push_back(parameter);
+    }
+    return all;
+  }
   if (std::string(node.name) == "homing") return parametersUnder("Kinds of homing", "axes/x/");
   if (std::string(node.name) == "corexy") return parametersUnder("Axes that share motors", "");
   std::vector<Parameter> all = parametersUnder("The node", "");
@@ -365,11 +382,12 @@ TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
     // Its other maps are those of every axis.
     if (GetParam().name == std::string("gantry") && map != "axes/x/motors/left") continue;
     if (GetParam().name == std::string("corexy") && map != "kinematics") continue;
-    if (GetParam().name == std::string("uart_chip") && map != "axes/x/tmc") continue;
+    if (isRegisterChip(GetParam()) && map != "axes/x/tmc") continue;
     if (GetParam().name == std::string("homing")) continue;  // see HomingKinds
     std::set<std::string> expected = on_page;
     // An axis can be of either kind, and the message about keys of both kinds says so.
-    const bool is_of_any_kind = map == "axes/x" || map == "axes/x/motors/left";
+    const bool is_of_any_kind =
+        map == "axes/x" || map == "axes/x/motors/left" || map == "axes/x/tmc";
     for (const std::string& key : on_page) {
       if (is_of_any_kind) expected.insert(rotaryKey(key));
     }
@@ -425,8 +443,7 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
     EXPECT_EQ(given.config, without.config) << parameter.key << ": " << parameter.fallback;
     ++compared;
   }
-  const bool has_few = GetParam().name == std::string("corexy") ||
-                       GetParam().name == std::string("uart_chip") ||
+  const bool has_few = GetParam().name == std::string("corexy") || isRegisterChip(GetParam()) ||
                        GetParam().name == std::string("homing");
   EXPECT_GT(compared, has_few ? -1 : 5);
 }
@@ -440,7 +457,8 @@ TEST(HomingKinds, HaveTheKeysOnThePageAndNoOthers) {
     }
   }
   std::set<std::string> known;
-  for (const char* kind : {"limit", "flag", "flag_centre", "index", "block", "direct"}) {
+  for (const char* kind : {"limit", "flag", "flag_centre", "index", "block", "direct",
+                           "stall"}) {
     Node node = homing();
     const ConfigValue only_kind(ConfigValue::Map{{"kind", kind}});
     node.base = with(node.base, "axes/x/homing", &only_kind);
@@ -453,7 +471,7 @@ std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param
 
 INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
                          testing::Values(driver(false), driver(true), gantry(), corexy(), homing(),
-                                         uartChip(), joystickNode(), baseNode()),
+                                         uartChip(), spiChip(), joystickNode(), baseNode()),
                          nameOf);
 
 }  // namespace

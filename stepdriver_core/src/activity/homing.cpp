@@ -62,6 +62,8 @@ std::unique_ptr<Homing> Homing::make(Context& context, axis::AxisModel& axis, st
       return std::make_unique<HomingToFlag>(context, axis, id, std::move(outcome));
     case config::HomingKind::kDirect:
       return std::make_unique<HomingInPlace>(context, axis, id, std::move(outcome));
+    case config::HomingKind::kStall:
+      return std::make_unique<HomingToStall>(context, axis, id, std::move(outcome));
     case config::HomingKind::kLimit:
       break;
   }

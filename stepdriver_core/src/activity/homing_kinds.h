@@ -91,6 +91,53 @@ class HomingToBlock final : public Homing {
   double trigger_ = 0.0;  // [microsteps] of the joint, by the last approach
 };
 
+/// A homing to a stall, which the driver chip detects (StallGuard): with a current and a threshold
+/// of its own, at one speed, and armed only while the speed is constant. It approaches until two
+/// approaches in a row end at the same place. The chip's registers are as before for the last move.
+class HomingToStall final : public Homing {
+ public:
+  HomingToStall(Context& context, axis::AxisModel& axis, std::uint64_t id,
+                std::shared_ptr<Result> outcome);
+
+ protected:
+  void start() override;
+  void strokeEnded() override;
+  void look(bool stroke_has_ended) override;
+  pulse::Nanoseconds lookDue() const override;
+  std::string unmet() const override;
+
+ private:
+  enum class Waits { kNothing, kPrepared, kArmed, kLoad, kDisarmed, kBackedOff, kEnded };
+
+  void post(bus::RegisterJob job, Waits waits);
+  void take(const bus::RegisterDone& done);
+  void approach();
+  void backOff();
+  void watch();
+  void noteLoad(std::uint32_t load);
+  void disarmed(int mscnt);
+  void compare();
+  bool isApproach() const {
+    return phase() == axis::HomingPhase::kSeeking || phase() == axis::HomingPhase::kLatching;
+  }
+  bool isAtSpeed() const;
+  bool hasDiag() const { return axis_.config.fault.has_value(); }
+  double fullStep() const;  // [microsteps]
+
+  motor::TmcChip& chip_;
+  const config::StallConfig stall_;
+  Waits waits_ = Waits::kNothing;
+  std::uint64_t job_ = 0;
+  motor::StepAudit audit_;  // of this homing: its direction
+  pulse::Nanoseconds at_speed_since_ = pulse::kNever;
+  pulse::Nanoseconds look_at_ = pulse::kNever;
+  bool armed_ = false;
+  int approaches_ = 0;
+  std::optional<double> before_;  // [microsteps] the joint's place at the stall before the last one
+  double trigger_ = 0.0;          // the same at the last one
+  int mscnt_ = 0;                 // there
+};
+
 /// A homing without a motion: the axis is declared to stand at the trigger point.
 class HomingInPlace final : public Homing {
  public:

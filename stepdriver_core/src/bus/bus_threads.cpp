@@ -79,14 +79,10 @@ void BusThreads::run(Port& port) {
 // A port that has failed is opened again by the next job: its adapter may be back.
 RegisterDone BusThreads::carryOutOn(Port& port, const RegisterJob& job) {
   try {
-    if (port.stream == nullptr) {
-      port.stream = open_(job.port, job.baud);
-      port.uart = std::make_unique<RegisterUart>(*port.stream, job.baud);
-    }
-    return carryOut(job, *port.uart, [this] { return isEnding(); });
+    if (port.registers == nullptr) port.registers = open_(job.port, job.baud);
+    return carryOut(job, *port.registers, [this] { return isEnding(); });
   } catch (const PortError& error) {
-    port.uart.reset();
-    port.stream.reset();
+    port.registers.reset();
     RegisterDone done;
     done.id = job.id;
     done.failure = Failure::kPort;

@@ -15,13 +15,13 @@
 
 namespace stepdriver::bus {
 
-/// Carries out jobs on the registers of driver chips. Each serial port has a thread of its own: a
+/// Carries out jobs on the registers of driver chips. Each port has a thread of its own: a
 /// port that is slow, or whose chips don't answer, delays nothing else. The jobs of a port keep
 /// their order. Each ends after a bounded time, whatever the port does.
 class BusThreads {
  public:
   /// Opens the port of a job. @throw PortError
-  using Open = std::function<std::unique_ptr<ByteStream>(const std::string& port, int baud)>;
+  using Open = std::function<std::unique_ptr<RegisterPort>(const std::string& port, int baud)>;
 
   /// @param threaded false: begin() carries the job out at once.
   /// @param told called from the thread of a port when there is something to collect.
@@ -44,9 +44,8 @@ class BusThreads {
     std::deque<RegisterJob> jobs;
     std::condition_variable changed;
     std::thread thread;
-    // Of its thread alone:
-    std::unique_ptr<ByteStream> stream;
-    std::unique_ptr<RegisterUart> uart;
+    // Of its thread alone; nullptr: it isn't open:
+    std::unique_ptr<RegisterPort> registers;
   };
 
   void run(Port& port);

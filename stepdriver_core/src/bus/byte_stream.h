@@ -3,15 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stepdriver_core/error.h"
+#include "port_error.h"
 
 namespace stepdriver::bus {
-
-/// A serial port can't be opened, or has gone: its text says why, and what helps.
-class PortError : public Error {
- public:
-  using Error::Error;
-};
 
 /// Bytes in both directions.
 class ByteStream {

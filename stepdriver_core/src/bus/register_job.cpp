@@ -6,30 +6,30 @@ namespace {
 constexpr int kRuns = 3;
 
 /// One access, whose value is added to the results.
-Failure carryOut(const RegisterAccess& access, RegisterUart& uart, RegisterDone& done) {
+Failure carryOut(const RegisterAccess& access, RegisterPort& port, RegisterDone& done) {
   using Kind = RegisterAccess::Kind;
   std::uint32_t value = access.value;
   Failure failure = Failure::kNone;
   switch (access.kind) {
     case Kind::kUnchecked:
-      uart.writeUnchecked(access.address, access.number, access.value);
+      port.writeUnchecked(access.address, access.number, access.value);
       break;
     case Kind::kWrite:
-      failure = uart.write(access.address, access.number, access.value);
+      failure = port.write(access.address, access.number, access.value);
       break;
     case Kind::kWriteBack:
-      failure = uart.write(access.address, access.number, access.value);
-      if (failure == Failure::kNone) failure = uart.read(access.address, access.number, 0, value);
+      failure = port.write(access.address, access.number, access.value);
+      if (failure == Failure::kNone) failure = port.read(access.address, access.number, 0, value);
       if (failure == Failure::kNone && value != access.value) failure = Failure::kMismatch;
       break;
     case Kind::kRead:
-      failure = uart.read(access.address, access.number, access.mask, value);
+      failure = port.read(access.address, access.number, access.mask, value);
       break;
     case Kind::kSample:
-      failure = uart.sample(access.address, access.number, value);
+      failure = port.sample(access.address, access.number, value);
       break;
     case Kind::kExpect:
-      failure = uart.read(access.address, access.number, ~access.mask, value);
+      failure = port.read(access.address, access.number, ~access.mask, value);
       if (failure == Failure::kNone && ((value ^ access.value) & access.mask) != 0) {
         failure = Failure::kMismatch;
       }
@@ -42,12 +42,12 @@ Failure carryOut(const RegisterAccess& access, RegisterUart& uart, RegisterDone&
 
 }  // namespace
 
-RegisterDone carryOut(const RegisterJob& job, RegisterUart& uart,
+RegisterDone carryOut(const RegisterJob& job, RegisterPort& port,
                       const std::function<bool()>& ends) {
   RegisterDone done;
   done.id = job.id;
-  const std::uint64_t transactions = uart.transactions();
-  const std::uint64_t retries = uart.retries();
+  const std::uint64_t transactions = port.transactions();
+  const std::uint64_t retries = port.retries();
   for (int run = 0; run < kRuns; ++run) {
     done.values.clear();
     done.failure = Failure::kNone;
@@ -58,12 +58,12 @@ RegisterDone carryOut(const RegisterJob& job, RegisterUart& uart,
         return done;
       }
       done.failed_number = job.accesses[i].number;
-      done.failure = carryOut(job.accesses[i], uart, done);
+      done.failure = carryOut(job.accesses[i], port, done);
     }
     if (done.failure != Failure::kStray || !job.writes_all) break;
   }
-  done.transactions = uart.transactions() - transactions;
-  done.retries = uart.retries() - retries;
+  done.transactions = port.transactions() - transactions;
+  done.retries = port.retries() - retries;
   return done;
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "register_uart.h"
+#include "register_port.h"
 
 namespace stepdriver::bus {
 
@@ -31,8 +31,8 @@ struct RegisterAccess {
 /// Accesses to the chips of one port, in their order; the first that fails ends it.
 struct RegisterJob {
   std::uint64_t id = 0;
-  std::string port;  ///< as configured
-  int baud = 115200;
+  std::string port;   ///< as configured
+  int baud = 115200;  ///< 0: it is an SPI device
   std::vector<RegisterAccess> accesses;
   /// It writes all registers of the chip. If a damaged write may have changed another one, it
   /// begins again.
@@ -54,7 +54,7 @@ struct RegisterDone {
 /// Carries out the accesses of a job.
 /// @param ends asked before each access: whether to give up. May be empty.
 /// @throw PortError
-RegisterDone carryOut(const RegisterJob& job, RegisterUart& uart,
+RegisterDone carryOut(const RegisterJob& job, RegisterPort& port,
                       const std::function<bool()>& ends);
 
 }  // namespace stepdriver::bus

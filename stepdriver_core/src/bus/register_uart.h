@@ -3,53 +3,23 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <string>
+#include <memory>
 
 #include "byte_stream.h"
+#include "register_port.h"
 
 namespace stepdriver::bus {
 
-/// Why a register could not be read or written.
-enum class Failure {
-  kNone,
-  kPort,        ///< the port can't be opened, or is gone
-  kNothing,     ///< not even the bytes that were sent came back
-  kOnlyEcho,    ///< no chip answers
-  kNoEcho,      ///< an answer without the bytes that were sent
-  kGarbled,     ///< other bytes than those of an answer
-  kUnsettled,   ///< two answers that differ
-  kNotCounted,  ///< the chip hasn't counted a write
-  kStray,       ///< the chip has counted a write that was garbled: any register may be wrong
-  kMismatch,    ///< it was read back with another value
-};
-
-/// In words, with the likely cause: "no chip answers, ...".
-std::string causeOf(Failure failure);
-
-/// The registers of the chips on a wire. Nothing is believed that noise could have made: a value
-/// counts when the chip has said it twice, and a write when the chip has counted it (IFCNT) and the
-/// wire has carried the bytes that were sent.
-class RegisterUart {
+/// The registers of the chips on a wire. A value counts when the chip has said it twice, and a
+/// write when the chip has counted it (IFCNT) and the wire has carried the bytes that were sent.
+class RegisterUart : public RegisterPort {
  public:
   /// @param stream outlives it.
   RegisterUart(ByteStream& stream, int baud);
+  RegisterUart(std::unique_ptr<ByteStream> stream, int baud);
 
-  /// [bits] that change at any time: two answers may differ in them.
-  /// @throw PortError
-  Failure read(std::uint8_t address, std::uint8_t number, std::uint32_t volatile_bits,
-               std::uint32_t& value);
-  /// The same for a measured value, which is another one each time: it counts when the chip has
-  /// said it once. Nothing may depend on it. @throw PortError
-  Failure sample(std::uint8_t address, std::uint8_t number, std::uint32_t& value);
-  /// @throw PortError
-  Failure write(std::uint8_t address, std::uint8_t number, std::uint32_t value);
-  /// Without a look at what comes of it, for chips that don't answer properly yet. @throw PortError
-  void writeUnchecked(std::uint8_t address, std::uint8_t number, std::uint32_t value);
-
-  /// Reads and writes that succeeded.
-  std::uint64_t transactions() const { return transactions_; }
-  /// Tries that failed.
-  std::uint64_t retries() const { return retries_; }
+  Failure write(std::uint8_t address, std::uint8_t number, std::uint32_t value) override;
+  void writeUnchecked(std::uint8_t address, std::uint8_t number, std::uint32_t value) override;
 
  private:
   struct Heard {
@@ -59,12 +29,11 @@ class RegisterUart {
 
   /// Sends bytes, and hears what is on the wire until so many have come, or too many, or no more.
   Heard exchange(const std::uint8_t* bytes, std::size_t count, std::size_t expected);
-  Failure readOnce(std::uint8_t address, std::uint8_t number, std::uint32_t& value);
+  Failure readOnce(std::uint8_t address, std::uint8_t number, std::uint32_t& value) override;
 
+  const std::unique_ptr<ByteStream> own_stream_;  // nullptr: it belongs to somebody else
   ByteStream& stream_;
   const std::int64_t byte_ns_;
-  std::uint64_t transactions_ = 0;
-  std::uint64_t retries_ = 0;
 };
 
 }  // namespace stepdriver::bus

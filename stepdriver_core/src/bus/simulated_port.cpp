@@ -23,4 +23,9 @@ std::size_t SimulatedPort::receive(std::uint8_t* bytes, std::size_t most, std::i
   return count;
 }
 
+void SimulatedSpi::transfer(const std::uint8_t* sent, std::uint8_t* heard, std::size_t count) {
+  const auto bytes = exchange_(sent, count, true);
+  std::copy_n(bytes.begin(), std::min(bytes.size(), count), heard);
+}
+
 }  // namespace stepdriver::bus

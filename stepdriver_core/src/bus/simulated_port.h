@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "byte_stream.h"
+#include "spi_device.h"
 
 namespace stepdriver::bus {
 
@@ -26,6 +27,17 @@ class SimulatedPort : public ByteStream {
   const Exchange exchange_;
   std::deque<std::uint8_t> heard_;
   bool pauses_ = true;
+};
+
+/// An SPI device of a simulated board.
+class SimulatedSpi : public SpiDevice {
+ public:
+  explicit SimulatedSpi(SimulatedPort::Exchange exchange) : exchange_(std::move(exchange)) {}
+
+  void transfer(const std::uint8_t* sent, std::uint8_t* heard, std::size_t count) override;
+
+ private:
+  const SimulatedPort::Exchange exchange_;
 };
 
 }  // namespace stepdriver::bus

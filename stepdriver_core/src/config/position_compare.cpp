@@ -20,7 +20,7 @@ namespace {
 constexpr double kMostPlaces = 1e6;
 // [ns] A line is written twice in this time on any computer that was tried.
 constexpr std::int64_t kShortestPulse = 10'000;
-constexpr std::int64_t kLongestTime = 10'000'000'000;
+constexpr std::int64_t kLongestTimeNs = 10'000'000'000;
 // [steps] Counts beyond it aren't exact in what computes with doubles.
 constexpr double kFarthest = 1e12;
 
@@ -62,9 +62,9 @@ class CompareCheck {
 
   void checkTimes() {
     const auto check = [this](const char* what, std::int64_t value, std::int64_t least) {
-      if (value >= least && value <= kLongestTime) return;
+      if (value >= least && value <= kLongestTimeNs) return;
       refuse("has a {} of {}, but it must be {} to {}", what, secondsOf(value), secondsOf(least),
-             secondsOf(kLongestTime));
+             secondsOf(kLongestTimeNs));
     };
     check("lead of on", compare_.lead_on_ns, 0);
     check("lead of off", compare_.lead_off_ns, 0);

@@ -103,6 +103,7 @@ class AxesReader {
     readPower(axis, pins_are_right, config);
     readBrake(axis, pins_are_right, config, used_);
     const std::optional<Kind> kind = readMotion(axis, context, config);
+    readSpeedsOfChips(axis, config);
     readShaper(axis, kind, config);
     readHoming(axis, kind, config);
     readSquaring(axis, kind, config);

@@ -22,8 +22,14 @@ constexpr double kLongestDebounceMs = 1000.0;
 constexpr int kHighestOrder = 1000;
 
 // In the order of HomingKind.
-const std::vector<std::string> kKinds = {"limit", "flag",  "flag_centre",
-                                         "index", "block", "direct"};
+const std::vector<std::string> kKinds = {"limit", "flag",   "flag_centre", "index",
+                                         "block", "direct", "stall"};
+// [full steps/s] A revolution a second of a motor with 200 of them. Below that, its voltage is too
+// low for StallGuard (TMC2209 datasheet, section 11).
+constexpr double kSlowestStall = 200.0;
+// [full steps] The chip measures a stall within so many; then the motor must have come to its speed
+// again before the second approach.
+constexpr double kStallTakes = 4.0;
 const std::vector<std::string> kEnds = {"min", "max"};
 
 /// Whether the trigger of the homing lies so far inside the soft limit at its end that the axis,
@@ -66,10 +72,11 @@ class HomingReader {
   }
   bool isLimit() const { return result_.kind == HomingKind::kLimit; }
   bool isBlock() const { return result_.kind == HomingKind::kBlock; }
+  bool isStall() const { return result_.kind == HomingKind::kStall; }
 
   void readMotion() {
     const bool has_end = isLimit() ? readSwitch() : readDirection();
-    if (!isLimit()) readSensor();
+    if (!isLimit() && !isStall()) readSensor();
     readSpeeds();
     readDistances(has_end);
     result_.timeout = homing_.number("timeout_s", {0.0, kLongestTime, true}, result_.timeout);
@@ -146,6 +153,7 @@ class HomingReader {
         readSpeed(seek_key, units(config_.max_speed),
                   fmt::format("{}, which is {}", keys_.max_speed, axis_.shown(keys_.max_speed)));
     result_.seek_speed = si(seek.value_or(0.0));
+    if (isStall()) return checkStallSpeed(seek_key, seek);
     if (isBlock() && result_.approaches == 1) return;
     // The count stays correct at the switch only at a speed from which the motor stops at once. A
     // motor that is blocked has stopped, and a flag is passed.
@@ -159,6 +167,46 @@ class HomingReader {
       mustBe(latch_key, fmt::format("at most {}, which is {}", seek_key, homing_.shown(seek_key)));
     }
     result_.latch_speed = si(latch.value_or(0.0));
+  }
+
+  /// [full steps per unit of the configuration]
+  double fullSteps() const { return config_.steps_per_unit / config_.microsteps / units(1.0); }
+
+  void checkStallSpeed(const std::string& key, const std::optional<double>& speed) {
+    if (config_.motors() > 1) {
+      homing_.contradiction("kind",
+                            "is stall, but must be another one: it is only for an axis with "
+                            "one motor");
+      return;
+    }
+    if (!config_.tmc || !config_.tmc->stall) {
+      homing_.contradiction("kind", fmt::format("is stall, but {} is missing",
+                                                axis_.fullName("tmc/stall_threshold")));
+      return;
+    }
+    if (!speed || config_.steps_per_unit <= 0.0) return;
+    const double rate = *speed * fullSteps();
+    if (rate * kSlack < kSlowestStall) {
+      mustBe(key,
+             fmt::format("at least {}, which is {} full steps/s: a slower motor shows no stall",
+                         lowerBoundText(kSlowestStall / fullSteps()), numberText(kSlowestStall)));
+    }
+    const double above = config_.tmc->spread_cycle_above;
+    if (above > 0.0 && rate >= above) {
+      mustBe(key, fmt::format("below tmc/spreadcycle_above, which is {}: the chip detects stalls "
+                              "below it only",
+                              roughText(above / fullSteps())));
+    }
+  }
+
+  /// The second approach must come to its speed, and the chip must have measured there.
+  void checkStallPullOff(const std::string& key, double pull_off) {
+    if (config_.steps_per_unit <= 0.0 || config_.acceleration <= 0.0) return;
+    const double ramp = result_.seek_speed * result_.seek_speed / (2.0 * config_.acceleration);
+    const double least = units(2.0 * ramp) + 2.0 * kStallTakes / fullSteps();
+    if (pull_off >= least) return;
+    mustBe(key, fmt::format("at least {}, in which the axis comes to its speed again",
+                            lowerBoundText(least)));
   }
 
   /// @return whether it is right.
@@ -181,8 +229,8 @@ class HomingReader {
                                      upperBoundText(kFarthestTravel / steps)));
     }
     const auto final_position = homing_.findNumber(final_key, Range{}, Presence::kOptional);
-    const bool backs_off = isBlock() && result_.approaches == 2;
-    const bool stops_there = isLimit() || isBlock();
+    const bool backs_off = isStall() || (isBlock() && result_.approaches == 2);
+    const bool stops_there = isLimit() || isBlock() || isStall();
     const bool needs_pull_off = (stops_there && !homing_.has(final_key)) || backs_off;
     const auto pull_off =
         homing_.findNumber(pull_off_key, Range::notNegative(),
@@ -194,6 +242,8 @@ class HomingReader {
     }
     if (backs_off && pull_off && *pull_off == 0.0) {
       mustBe(pull_off_key, "above 0, from where the second approach begins");
+    } else if (isStall() && pull_off && !too_far) {
+      checkStallPullOff(pull_off_key, *pull_off);
     }
     result_.max_travel = si(travel.value_or(0.0));
     result_.pull_off = si(pull_off.value_or(0.0));
@@ -260,7 +310,7 @@ class HomingReader {
     const std::string key = inUnit("final_position");
     const double position = *result_.final_position;
     checkWithinLimits(key, position);
-    if (!isLimit() && !isBlock()) return;
+    if (!isLimit() && !isBlock() && !isStall()) return;
     const double beyond = result_.at_max ? position - result_.offset : result_.offset - position;
     if (beyond <= step()) return;
     mustBe(key, fmt::format("{} {}, which is {}", result_.at_max ? "at most" : "at least",

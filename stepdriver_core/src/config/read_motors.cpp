@@ -260,6 +260,21 @@ void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisCon
   if (all_known) checkSameEdges(motors, config);
 }
 
+void readSpeedsOfChips(ConfigReader& axis, AxisConfig& config) {
+  if (config.steps_per_unit <= 0.0) return;
+  if (config.twins.empty()) {
+    if (config.tmc) readTmcSpeeds(axis, config, *config.tmc);
+    return;
+  }
+  ConfigReader motors = axis.map("motors");
+  const auto read = [&](MotorConfig& motor) {
+    ConfigReader reader = motors.map(motor.motor);
+    if (motor.tmc) readTmcSpeeds(reader, config, *motor.tmc);
+  };
+  read(config);
+  for (MotorConfig& twin : config.twins) read(twin);
+}
+
 void readSquaring(ConfigReader& axis, std::optional<Kind> kind, AxisConfig& config) {
   if (kind) SquaringReader(axis, *kind, config).read();
 }

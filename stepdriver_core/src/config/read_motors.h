@@ -35,6 +35,9 @@ const char* offsetKey(Kind kind);
 void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisConfig& config,
                 UsedLines& used);
 
+/// Reads the speeds in each motor's `tmc`. @pre readMotors() and readMotion()
+void readSpeedsOfChips(ConfigReader& axis, AxisConfig& config);
+
 /// Reads what a homing needs to square several motors: `max_skew` and each motor's `offset`.
 ///
 /// @pre readMotors() and readHoming()

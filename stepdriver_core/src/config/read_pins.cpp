@@ -121,6 +121,7 @@ class PinsReader {
     }
     config.pins = pins_;
     config.fault = fault_;
+    config.fault_ramps = fault_ramps_;
     config.in_position = in_position_;
   }
 
@@ -184,9 +185,10 @@ class PinsReader {
   void readFaultPin() {
     reader_.allow("fault");
     const Bias bias = readBias(axis_, "fault_bias");
-    const bool ramps = axis_.oneOf("fault_stop", {"at_once", "ramp"}, "at_once") == "ramp";
+    fault_ramps_ = axis_.oneOf("fault_stop", {"at_once", "ramp"}, "at_once") == "ramp";
     if (!reader_.has("fault")) {
-      refuseWithout("fault", {"fault_bias", "fault_stop"});
+      refuseWithout("fault", {"fault_bias"});
+      if (!axis_.has("tmc")) refuseWithout("fault", {"fault_stop"});
       return;
     }
     if (chip_ != nullptr && !chip_->fault_active) {
@@ -195,7 +197,7 @@ class PinsReader {
       return;
     }
     if (const auto line = readLine(reader_, "fault", Presence::kOptional, used_)) {
-      fault_ = FaultPin{*line, bias, ramps};
+      fault_ = FaultPin{*line, bias};
     }
   }
 
@@ -333,6 +335,7 @@ class PinsReader {
   ConfigReader reader_;
   Pins pins_;
   std::optional<FaultPin> fault_;
+  bool fault_ramps_ = false;
   std::optional<InPositionPin> in_position_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "driver/tmc_registers.h"
 #include "message_text.h"
+#include "motion_keys.h"
 #include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::config {
@@ -14,11 +15,13 @@ namespace {
 
 namespace tmc = driver::tmc;
 
-const std::vector<std::string> kChips = {"tmc2208", "tmc2209", "tmc2226"};
+const std::vector<std::string> kChips = {"tmc2208", "tmc2209", "tmc2226", "tmc2130", "tmc5160"};
 const std::vector<std::string> kModes = {"stealthchop", "spreadcycle"};
+const std::vector<std::string> kEdges = {"one", "both"};
 // The chip measures the rate of each frame with its clock, up to 500 kbaud.
 const std::vector<int> kBauds = {9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000};
 constexpr int kMostAddress = 3;
+constexpr int kMostThreshold = 255;  // of SGTHRS
 // Boards have 50 to 150 mOhm; motors of less than 0.2 A have more.
 constexpr Range kResistors{10.0, 1000.0};
 constexpr double kMilliohm = 1e-3;
@@ -26,29 +29,43 @@ constexpr double kHalf = 0.5;
 // Of a current that was written with its digits and read again.
 constexpr double kRounded = 1e-9;
 
+const char* aboveKey(Kind kind) {
+  return kind == Kind::kLinear ? "spreadcycle_above_mm_s" : "spreadcycle_above_deg_s";
+}
+
+/// [mm|degrees] of a full step of an axis.
+double fullStepTravel(const AxisConfig& axis) {
+  const auto units_per_si = static_cast<double>(motionKeys(axis.kind).units_per_si_unit);
+  return units_per_si * axis.microsteps / axis.steps_per_unit;
+}
+
 class TmcReader {
  public:
-  TmcReader(ConfigReader& motor, const driver::DriverChip& chip)
-      : reader_(motor.map("tmc")), chip_(chip) {}
+  TmcReader(ConfigReader& motor, driver::DriverChip& chip)
+      : reader_(motor.map("tmc")),
+        chip_(chip),
+        is_on_spi_(driver::registerBusOf(chip) == driver::RegisterBus::kSpi) {}
 
   std::optional<TmcConfig> read(UsedPorts& used) {
     const std::size_t before = reader_.issues().size();
     TmcConfig config;
-    const auto port = reader_.findText("port", Presence::kRequired);
-    if (port && (port->empty() || port->front() != '/')) {
-      reader_.issue("port", fmt::format("is {}, but must be the path of a serial port, such as "
-                                        "\"/dev/serial0\"",
-                                        reader_.shown("port")));
+    if (is_on_spi_) {
+      readSpi(config);
+    } else {
+      readUart(config);
     }
-    config.port = port.value_or("");
-    config.baud = reader_.findOneOf("baud", kBauds, Presence::kOptional).value_or(config.baud);
-    config.address = readAddress();
     const auto mode = reader_.findOneOf("mode", kModes, Presence::kOptional);
     config.mode = mode == kModes.back() ? ChopperMode::kSpreadCycle : ChopperMode::kStealthChop;
     config.interpolate = reader_.boolean("interpolate", config.interpolate);
+    if (const auto edges = reader_.findOneOf("step_edges", kEdges, Presence::kOptional)) {
+      chip_.both_edges = edges == kEdges.back();
+    }
+    for (const Kind kind : {Kind::kLinear, Kind::kRotary}) reader_.allow(aboveKey(kind));
+    const bool has_stall = readStall(config);
     config.hold_delay =
         reader_.number("hold_delay_s", {0.0, tmc::longestHoldDelay()}, config.hold_delay);
     readCurrents(config);
+    if (has_stall) readStallCurrent(config);
     reader_.rejectUnknown();
     if (reader_.issues().size() != before) return {};
     used.add(reader_, config);
@@ -57,6 +74,64 @@ class TmcReader {
   }
 
  private:
+  /// @return whether there is a threshold, and nothing is wrong.
+  bool readStall(TmcConfig& config) {
+    const std::size_t before = reader_.issues().size();
+    const int threshold = reader_.integer("stall_threshold", 0, kMostThreshold, 0);
+    const int phase = reader_.integer("stall_phase", 0, tmc::kMscntPerCycle - 1, 0);
+    stall_current_ = reader_.findNumber("stall_current_a", Range::positive(), Presence::kOptional);
+    if (!reader_.has("stall_threshold")) {
+      for (const char* key : {"stall_phase", "stall_current_a"}) {
+        if (!reader_.has(key)) continue;
+        reader_.contradiction(key, fmt::format("is {}, but {} is missing", reader_.shown(key),
+                                               reader_.fullName("stall_threshold")));
+      }
+      return false;
+    }
+    if (tmc::modelOf(chip_.name) != tmc::Model::kTmc2209) {
+      reader_.contradiction("stall_threshold",
+                            fmt::format("is {}, but is only for the TMC2209 and TMC2226",
+                                        reader_.shown("stall_threshold")));
+    }
+    if (config.mode == ChopperMode::kSpreadCycle) {
+      reader_.contradiction("stall_threshold",
+                            fmt::format("is {}, but the chip detects stalls in stealthchop only",
+                                        reader_.shown("stall_threshold")));
+    }
+    config.stall.emplace();
+    config.stall->threshold = threshold;
+    if (reader_.has("stall_phase")) config.stall->phase = phase;
+    return reader_.issues().size() == before;
+  }
+
+  void readStallCurrent(TmcConfig& config) {
+    config.stall->current = stall_current_.value_or(config.run_current);
+    if (!stall_current_ || config.run_current <= 0.0 || config.sense_resistor <= 0.0) return;
+    const tmc::Board board{tmc::modelOf(chip_.name), config.sense_resistor};
+    isWithin("stall_current_a", *stall_current_, tmc::lowestHold(config.run_current, board),
+             config.run_current);
+  }
+
+  std::string readDevice(const char* key, const char* what) {
+    const auto path = reader_.findText(key, Presence::kRequired);
+    if (path && (path->empty() || path->front() != '/')) {
+      reader_.issue(key,
+                    fmt::format("is {}, but must be the path of {}", reader_.shown(key), what));
+    }
+    return path.value_or("");
+  }
+
+  void readUart(TmcConfig& config) {
+    config.port = readDevice("port", "a serial port, such as \"/dev/serial0\"");
+    config.baud = reader_.findOneOf("baud", kBauds, Presence::kOptional).value_or(config.baud);
+    config.address = readAddress();
+  }
+
+  void readSpi(TmcConfig& config) {
+    config.port = readDevice("spi", "an SPI device, such as \"/dev/spidev0.0\"");
+    config.baud = 0;
+  }
+
   int readAddress() {
     if (chip_.name != kChips.front()) return reader_.integer("address", 0, kMostAddress);
     const int address = reader_.integer("address", 0, kMostAddress, 0);
@@ -88,22 +163,57 @@ class TmcReader {
     const double sense = *resistor * kMilliohm;
     config.sense_resistor = sense;
     config.run_current = *run;
-    if (!isWithin("run_current_a", *run, tmc::lowestCurrent(sense), tmc::highestCurrent(sense))) {
+    const tmc::Board board{tmc::modelOf(chip_.name), sense};
+    if (!isWithin("run_current_a", *run, tmc::lowestCurrent(board), tmc::highestCurrent(board))) {
       return;
     }
-    const double least = tmc::lowestHold(*run, sense);
+    const double least = tmc::lowestHold(*run, board);
     config.hold_current = hold.value_or(std::max(*run * kHalf, least));
     isWithin("hold_current_a", config.hold_current, least, *run);
   }
 
   ConfigReader reader_;
-  const driver::DriverChip& chip_;
+  driver::DriverChip& chip_;
+  const bool is_on_spi_;
+  std::optional<double> stall_current_;
 };
+
+ConfigValue::Map writtenTmc(const TmcConfig& tmc) {
+  ConfigValue::Map map;
+  if (tmc.baud == 0) {
+    map["spi"] = tmc.port;
+  } else {
+    map["port"] = tmc.port;
+    map["baud"] = tmc.baud;
+    map["address"] = tmc.address;
+  }
+  const ConfigValue::Map others{{"sense_resistor_mohm", tmc.sense_resistor / kMilliohm},
+                                {"run_current_a", tmc.run_current},
+                                {"hold_current_a", tmc.hold_current},
+                                {"hold_delay_s", tmc.hold_delay},
+                                {"mode", kModes.at(tmc.mode == ChopperMode::kSpreadCycle ? 1 : 0)},
+                                {"interpolate", tmc.interpolate}};
+  map.insert(others.begin(), others.end());
+  if (tmc.stall) {
+    map["stall_threshold"] = tmc.stall->threshold;
+    map["stall_current_a"] = tmc.stall->current;
+    if (tmc.stall->phase) map["stall_phase"] = *tmc.stall->phase;
+  }
+  return map;
+}
 
 }  // namespace
 
 void UsedPorts::add(ConfigReader& tmc, const TmcConfig& chip) {
   Port& port = ports_[chip.port];
+  if (chip.baud == 0) {
+    const auto [other, is_new] = port.chips.emplace(chip.address, tmc.fullName("spi"));
+    if (!is_new) {
+      tmc.contradiction("spi", fmt::format("is {}, but must be another one: it is {} already",
+                                           tmc.shown("spi"), other->second));
+    }
+    return;
+  }
   if (port.chips.empty()) {
     port.baud = chip.baud;
     port.key = tmc.fullName("baud");
@@ -123,25 +233,49 @@ std::optional<TmcConfig> readTmc(ConfigReader& motor, std::optional<driver::Driv
                                  UsedPorts& used) {
   motor.allow("tmc");
   if (!chip || !motor.has("tmc")) return {};
-  if (!driver::hasUart(*chip)) {
+  if (driver::registerBusOf(*chip) == driver::RegisterBus::kNone) {
     motor.contradiction("tmc", fmt::format("is given, but is only for {}; the driver is the {}",
                                            listText(kChips, "and"), chip->title));
     return {};
   }
-  chip = driver::uartChip(*chip);
+  chip = driver::registerChip(*chip);
   return TmcReader(motor, *chip).read(used);
 }
 
-ConfigValue::Map writeTmc(const TmcConfig& tmc) {
-  return {{"port", tmc.port},
-          {"baud", tmc.baud},
-          {"address", tmc.address},
-          {"sense_resistor_mohm", tmc.sense_resistor / kMilliohm},
-          {"run_current_a", tmc.run_current},
-          {"hold_current_a", tmc.hold_current},
-          {"hold_delay_s", tmc.hold_delay},
-          {"mode", kModes.at(tmc.mode == ChopperMode::kSpreadCycle ? 1 : 0)},
-          {"interpolate", tmc.interpolate}};
+void readTmcSpeeds(ConfigReader& motor, const AxisConfig& axis, TmcConfig& tmc) {
+  ConfigReader reader = motor.map("tmc");
+  const char* const key = aboveKey(axis.kind);
+  const char* const other = aboveKey(axis.kind == Kind::kLinear ? Kind::kRotary : Kind::kLinear);
+  if (reader.has(other)) {
+    reader.contradiction(
+        other, fmt::format("is {}, but the axis's speeds are in {}/s: give {}", reader.shown(other),
+                           motionKeys(axis.kind).unit, reader.fullName(key)));
+  }
+  const auto above = reader.findNumber(key, Range::positive(), Presence::kOptional);
+  if (!above) return;
+  if (tmc.mode == ChopperMode::kSpreadCycle) {
+    reader.contradiction(key, fmt::format("is {}, but is only for mode stealthchop: the mode is "
+                                          "spreadcycle at each speed",
+                                          reader.shown(key)));
+    return;
+  }
+  const double least = tmc::lowestThreshold() * fullStepTravel(axis);
+  const double most = tmc::highestThreshold() * fullStepTravel(axis);
+  if (*above < least || *above > most) {
+    reader.issue(key, fmt::format("is {}, but must be from {} to {}: the chip compares no other "
+                                  "speeds with this travel of a step",
+                                  reader.shown(key), lowerBoundText(least), upperBoundText(most)));
+    return;
+  }
+  tmc.spread_cycle_above = *above / fullStepTravel(axis);
+}
+
+ConfigValue::Map writeTmc(const TmcConfig& tmc, const AxisConfig& axis) {
+  ConfigValue::Map map = writtenTmc(tmc);
+  if (tmc.spread_cycle_above > 0.0) {
+    map[aboveKey(axis.kind)] = tmc.spread_cycle_above * fullStepTravel(axis);
+  }
+  return map;
 }
 
 }  // namespace stepdriver::config

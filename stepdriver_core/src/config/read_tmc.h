@@ -33,7 +33,11 @@ class UsedPorts {
 std::optional<TmcConfig> readTmc(ConfigReader& motor, std::optional<driver::DriverChip>& chip,
                                  UsedPorts& used);
 
+/// Reads the speeds in it, which need the scale of the axis.
+/// @param motor as for readTmc(). @pre readMotion()
+void readTmcSpeeds(ConfigReader& motor, const AxisConfig& axis, TmcConfig& tmc);
+
 /// The map `tmc` as a file would have it.
-ConfigValue::Map writeTmc(const TmcConfig& tmc);
+ConfigValue::Map writeTmc(const TmcConfig& tmc, const AxisConfig& axis);
 
 }  // namespace stepdriver::config

@@ -75,7 +75,7 @@ class AxisWriter {
     map["driver"] = driver;
     map["chip"] = writeChip(motor.driver);
     map["timing"] = writtenTiming(motor.driver.timing);
-    if (motor.tmc) map["tmc"] = writeTmc(*motor.tmc);
+    if (motor.tmc) map["tmc"] = writeTmc(*motor.tmc, axis_);
     writePins(motor, map);
     ConfigValue::Map endstops;
     if (motor.endstop_min) endstops["min"] = writeSwitch(*motor.endstop_min);
@@ -95,8 +95,8 @@ class AxisWriter {
     if (motor.fault) {
       pins["fault"] = motor.fault->line;
       map["fault_bias"] = biasText(motor.fault->bias);
-      map["fault_stop"] = motor.fault->ramps ? "ramp" : "at_once";
     }
+    if (motor.fault || motor.tmc) map["fault_stop"] = motor.fault_ramps ? "ramp" : "at_once";
     if (motor.in_position) {
       pins["in_position"] = motor.in_position->line;
       map["in_position_bias"] = biasText(motor.in_position->bias);

@@ -174,6 +174,19 @@ DriverChip tmc2130() {
   return chip;
 }
 
+/// Without `tmc` its pins CFG0 and CFG1 are strapped to one of these modes, before the power comes
+/// (TMC5160 datasheet, standalone operation).
+DriverChip tmc5160() {
+  DriverChip chip;
+  chip.name = "tmc5160";
+  chip.title = "TMC5160";
+  setTrinamicTiming(chip.timing);
+  chip.microsteps = {8, 16, 32, 64};
+  chip.enable_on = kLow;                     // DRV_ENN
+  chip.disabled = TranslatorState::kCounts;  // not stated: as in the TMC22xx
+  return chip;
+}
+
 /// Its own datasheet wasn't at hand: the figures are those of its siblings DRV8424 and DRV8884.
 DriverChip drv8434() {
   DriverChip chip;
@@ -287,8 +300,8 @@ DriverChip cl57t() {
 
 const std::vector<DriverChip>& namedChips() {
   static const std::vector<DriverChip> chips{a4988(),   drv8825(), tb6600(),  tmc2208(), tmc2209(),
-                                             tmc2226(), tmc2130(), drv8434(), lv8729(),  tb6560(),
-                                             dm542(),   dm556(),   cl57t()};
+                                             tmc2226(), tmc2130(), tmc5160(), drv8434(), lv8729(),
+                                             tb6560(),  dm542(),   dm556(),   cl57t()};
   return chips;
 }
 

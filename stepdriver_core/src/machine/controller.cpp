@@ -346,6 +346,7 @@ void Controller::superviseChips(axis::AxisModel& axis) {
     if (chip == nullptr) continue;
     if (axis.fault) chip->audit().end();
     if (!rests) chip->resting_count.reset();
+    endStall(axis, *chip);
     if (context_.now < pollDue(*chip)) continue;
     const bool audits = rests && context_.now >= chip->next_audit;
     if (audits) chip->resting_count = axis.motor.countOf(i);
@@ -355,6 +356,16 @@ void Controller::superviseChips(axis::AxisModel& axis) {
   }
 }
 
+// Whatever has ended a homing to a stall: its registers are for nothing else.
+void Controller::endStall(const axis::AxisModel& axis, motor::TmcChip& chip) {
+  if (!chip.isPreparedForStall() || chip.ending_stall != 0 || !chip.isSetUp()) return;
+  const Activity* const owner = activities_.owner(axis);
+  if (owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone) return;
+  bus::RegisterJob job = chip.endStall();
+  job.id = chip.ending_stall = context_.newJob();
+  context_.out->register_jobs.push_back(std::move(job));
+}
+
 void Controller::on(const bus::RegisterDone& done) {
   context_.register_done = done;
   if (const auto change = requests_.current_changes.extract(done.id)) {
@@ -362,8 +373,13 @@ void Controller::on(const bus::RegisterDone& done) {
   }
   for (const auto& axis : context_.axes) {
     for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
-      const motor::TmcChip* chip = axis->motor.tmcAt(i);
+      motor::TmcChip* chip = axis->motor.tmcAt(i);
       if (chip != nullptr && chip->polling == done.id) return takePoll(*axis, i, done);
+      if (chip == nullptr || chip->ending_stall != done.id) continue;
+      const std::string why = chip->takeEndOfStall(done);
+      axis->motor.noteChips();
+      if (!why.empty()) failChip(*axis, i, why);
+      return;
     }
   }
 }
@@ -403,6 +419,11 @@ void Controller::failChip(axis::AxisModel& axis, std::size_t motor, const std::s
   axis.fault.latch(axis.chipText(motor) + " " + fault, axis.motor.tmcAt(motor)->remedy());
   axis.distrust();
   axis.noteStop();
+  pulse::Command command;
+  command.kind = pulse::Command::Kind::kFault;
+  command.channel = axis.motor.channel();
+  command.serial = axis.motor.nextSerial();
+  context_.out->commands.push_back(command);
 }
 
 // ---- requests ----

@@ -71,6 +71,7 @@ class Controller {
   void superviseChips(axis::AxisModel& axis);
   void takePoll(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done);
   void takeCurrent(const RequestContext::CurrentChange& change, const bus::RegisterDone& done);
+  void endStall(const axis::AxisModel& axis, motor::TmcChip& chip);
   void failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault);
   /// When a chip is asked how it is; kNever: not, for now.
   pulse::Nanoseconds pollDue(const motor::TmcChip& chip) const;

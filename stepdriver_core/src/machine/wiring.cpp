@@ -88,6 +88,7 @@ void Wiring::connectHoming(const config::HomingConfig& homing, const MachineOpti
     if (input.name == homing.input) lines.homing_input = line;
     if (input.name == homing.flag) lines.homing_flag = line;
   }
+  if (homing.kind == config::HomingKind::kStall) channels[axis].block_is_fault = true;
   if (homing.kind != config::HomingKind::kBlock) return;
   if (lines.homing_input) channels[axis].block = lines.homing_input->signal;
   channels[axis].block_is_fault = homing.input.empty();

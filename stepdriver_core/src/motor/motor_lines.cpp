@@ -145,7 +145,7 @@ pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const Motor
     } else {
       channel.twins.push_back(signals);
     }
-    if (motor.fault) channel.ramps_at_fault = channel.ramps_at_fault || motor.fault->ramps;
+    channel.ramps_at_fault = channel.ramps_at_fault || motor.fault_ramps;
     if (motor.in_position) {
       channel.in_position_timeout =
           std::max(channel.in_position_timeout, nanoseconds(motor.in_position->timeout));

@@ -20,6 +20,9 @@ class StepAudit {
   /// @return the difference in words; empty if there is none.
   std::string check(int mscnt, std::int64_t count, int microsteps);
 
+  /// 1: MSCNT grows with the count; -1: against it; 0: not known yet.
+  int direction() const { return sign_; }
+
   /// What MSCNT must be at this count; empty if that isn't known.
   std::optional<int> mscntAt(std::int64_t count, int microsteps) const;
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace stepdriver::motor {
@@ -12,11 +13,10 @@ using Kind = bus::RegisterAccess::Kind;
 
 constexpr std::uint32_t kVersionMask = 0xFF000000U;
 constexpr unsigned kVersionShift = 24;
-constexpr std::uint32_t kVersion2208 = 0x20;
-constexpr std::uint32_t kVersion2209 = 0x21;  // and of the TMC2226
-
 constexpr const char* kWireRemedy =
     "check the chip's motor supply, its address and the wire to PDN_UART, then call recover";
+constexpr const char* kSpiRemedy =
+    "check the chip's supplies and the wires of its SPI, then call recover";
 constexpr const char* kPortRemedy = "then call recover";
 constexpr const char* kResetRemedy =
     "check the motor supply and its capacitor, then call recover, which writes all registers "
@@ -31,38 +31,25 @@ constexpr const char* kAuditRemedy =
     "its position";
 constexpr const char* kSupplyRemedy = "check the motor supply, then call recover";
 
-bool is2208(const config::MotorConfig& motor) { return motor.driver.name == "tmc2208"; }
-
 tmc::Settings settingsOf(const config::MotorConfig& motor) {
   const config::TmcConfig& config = *motor.tmc;
   tmc::Settings settings;
-  settings.current = tmc::scaleOf(config.run_current, config.hold_current, config.sense_resistor);
+  settings.model = tmc::modelOf(motor.driver.name);
+  settings.current = tmc::scaleOf(config.run_current, config.hold_current,
+                                  {settings.model, config.sense_resistor});
   settings.hold_delay = config.hold_delay;
   settings.spread_cycle = config.mode == config::ChopperMode::kSpreadCycle;
+  settings.spread_cycle_above = config.spread_cycle_above;
   settings.interpolate = config.interpolate;
   settings.both_edges = motor.driver.both_edges;
-  settings.has_stall_guard = !is2208(motor);
   return settings;
-}
-
-const char* nameOfVersion(std::uint32_t version) {
-  switch (version) {
-    case kVersion2208:
-      return "a TMC2208 or TMC2225";
-    case kVersion2209:
-      return "a TMC2209 or TMC2226";
-    default:
-      return "another chip";
-  }
 }
 
 }  // namespace
 
-TmcChip::TmcChip(const config::MotorConfig& motor)
-    : motor_(motor),
-      settings_(settingsOf(motor)),
-      version_(is2208(motor) ? kVersion2208 : kVersion2209) {
+TmcChip::TmcChip(const config::MotorConfig& motor) : motor_(motor), settings_(settingsOf(motor)) {
   state_.motor = motor.motor;
+  if (tmc::isOnSpi(settings_.model)) state_.highest_stall_guard = 1023;
   noteCurrents();
 }
 
@@ -72,7 +59,7 @@ void TmcChip::noteCurrents() {
 }
 
 double TmcChip::currentOf(int scale) const {
-  return tmc::currentOf(scale, settings_.current.fine, config().sense_resistor);
+  return tmc::currentOf(scale, settings_.current.range, board());
 }
 
 bus::RegisterJob TmcChip::jobOf(Accesses accesses) const {
@@ -83,6 +70,8 @@ bus::RegisterJob TmcChip::jobOf(Accesses accesses) const {
   return job;
 }
 
+tmc::Board TmcChip::board() const { return {settings_.model, config().sense_resistor}; }
+
 bus::RegisterAccess TmcChip::read(std::uint8_t number, std::uint32_t volatile_bits) const {
   return {Kind::kRead, static_cast<std::uint8_t>(config().address), number, 0, volatile_bits};
 }
@@ -92,21 +81,22 @@ bus::RegisterJob TmcChip::setUp(int microsteps, const std::vector<int>& port_add
   const std::vector<tmc::RegisterValue> values = tmc::setUpOf(settings_, microsteps);
   Accesses all;
   // An answer that comes too soon is a frame to the other chips, which then don't hear the next.
-  for (const int other : port_addresses) {
+  for (const int other : tmc::isOnSpi(settings_.model) ? std::vector<int>() : port_addresses) {
     const tmc::RegisterValue& delay = values.front();
     all.push_back(
         {Kind::kUnchecked, static_cast<std::uint8_t>(other), delay.number, delay.value, 0});
   }
-  all.push_back({Kind::kExpect, address, tmc::kIoin, version_ << kVersionShift, kVersionMask});
+  all.push_back({Kind::kExpect, address, tmc::ioinOf(settings_.model),
+                 tmc::versionOf(settings_.model) << kVersionShift, kVersionMask});
   for (const tmc::RegisterValue& value : values) {
     all.push_back({value.reads_back ? Kind::kWriteBack : Kind::kWrite, address, value.number,
                    value.value, 0});
   }
-  all.push_back(read(tmc::kGstat));
+  all.push_back(readFlags());
   all.push_back({Kind::kWrite, address, tmc::kGstat, tmc::kGstatAll, 0});
   all.push_back(read(tmc::kMscnt));
-  all.push_back(read(tmc::kGstat));
-  all.push_back(read(tmc::kDrvStatus, tmc::kVolatileStatus));
+  all.push_back(readFlags());
+  all.push_back(read(tmc::kDrvStatus, tmc::volatileStatusOf(settings_.model)));
   bus::RegisterJob job = jobOf(std::move(all));
   job.writes_all = true;
   return job;
@@ -120,21 +110,29 @@ bus::RegisterJob TmcChip::changeMode(int microsteps) const {
        read(tmc::kMscnt)});
 }
 
+// Reading clears the flags of a TMC2130: a second answer would be another one.
+bus::RegisterAccess TmcChip::readFlags() const {
+  bus::RegisterAccess access = read(tmc::kGstat);
+  if (settings_.model == tmc::Model::kTmc2130) access.kind = Kind::kSample;
+  return access;
+}
+
 bus::RegisterJob TmcChip::poll(bool audits) const {
-  Accesses all{read(tmc::kGstat), read(tmc::kDrvStatus, tmc::kVolatileStatus)};
-  if (settings_.has_stall_guard) {
+  Accesses all{readFlags(), read(tmc::kDrvStatus, tmc::volatileStatusOf(settings_.model))};
+  if (settings_.model == tmc::Model::kTmc2209) {
     bus::RegisterAccess load = read(tmc::kSgResult);
     load.kind = Kind::kSample;
     all.push_back(load);
   }
+  // No damaged answer hides or makes up a reset: a chip that has forgotten its mode isn't set up.
+  if (tmc::isOnSpi(settings_.model)) all.push_back(read(tmc::kChopconf));
   if (audits) all.push_back(read(tmc::kMscnt));
   return jobOf(std::move(all));
 }
 
 tmc::CurrentScale TmcChip::scaleOf(double run, double hold) const {
-  const bool fine = settings_.current.fine;
-  return {tmc::scaleBelow(run, fine, config().sense_resistor),
-          tmc::scaleBelow(hold, fine, config().sense_resistor), fine};
+  const tmc::CurrentRange& range = settings_.current.range;
+  return {tmc::scaleBelow(run, range, board()), tmc::scaleBelow(hold, range, board()), range};
 }
 
 bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) const {
@@ -142,9 +140,63 @@ bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) const {
                  tmc::currentsOf(scale), 0}});
 }
 
+bus::RegisterAccess TmcChip::write(std::uint8_t number, std::uint32_t value) const {
+  return {Kind::kWrite, static_cast<std::uint8_t>(config().address), number, value, 0};
+}
+
+bus::RegisterJob TmcChip::prepareStall() const {
+  const config::StallConfig& stall = *config().stall;
+  tmc::CurrentScale scale = settings_.current;
+  scale.run = tmc::scaleBelow(stall.current, scale.range, board());
+  scale.hold = std::min(scale.hold, scale.run);
+  return jobOf({write(tmc::kTcoolthrs, 0), write(tmc::kTpwmthrs, 0),
+                write(tmc::kIholdIrun, tmc::currentsOf(scale)),
+                write(tmc::kSgthrs, static_cast<std::uint32_t>(stall.threshold)),
+                read(tmc::kMscnt)});
+}
+
+// A threshold is good for speeds from 80 % on of the one that it was found at.
+bus::RegisterJob TmcChip::armStall(double speed) const {
+  constexpr double kSlowest = 0.8;
+  return jobOf({write(tmc::kTcoolthrs, tmc::thresholdOf(kSlowest * speed))});
+}
+
+bus::RegisterJob TmcChip::readLoad() const {
+  bus::RegisterAccess load = read(tmc::kSgResult);
+  load.kind = Kind::kSample;
+  return jobOf({load});
+}
+
+bus::RegisterJob TmcChip::disarmStall() const {
+  return jobOf({write(tmc::kTcoolthrs, 0), read(tmc::kMscnt)});
+}
+
+bus::RegisterJob TmcChip::endStall() const {
+  return jobOf({write(tmc::kTcoolthrs, 0), write(tmc::kSgthrs, 0),
+                write(tmc::kTpwmthrs, tmc::thresholdOf(settings_.spread_cycle_above)),
+                write(tmc::kIholdIrun, tmc::currentsOf(settings_.current))});
+}
+
+std::string TmcChip::takeStall(const bus::RegisterDone& done) {
+  count(done);
+  return done.failure == bus::Failure::kNone ? "" : failureText(done);
+}
+
+std::string TmcChip::takeEndOfStall(const bus::RegisterDone& done) {
+  ending_stall = 0;
+  std::string why = takeStall(done);
+  if (why.empty()) prepared_for_stall_ = false;
+  return why;
+}
+
 void TmcChip::count(const bus::RegisterDone& done) {
   state_.transactions += done.transactions;
   state_.retries += done.retries;
+}
+
+std::string TmcChip::place() const {
+  if (tmc::isOnSpi(settings_.model)) return "on " + config().port;
+  return fmt::format("on {} at address {}", config().port, config().address);
 }
 
 std::string TmcChip::failureText(const bus::RegisterDone& done) {
@@ -153,34 +205,37 @@ std::string TmcChip::failureText(const bus::RegisterDone& done) {
     remedy_ = kPortRemedy;
     return done.port_error;
   }
-  remedy_ = kWireRemedy;
-  return fmt::format("on {} at address {}, {}", config().port, config().address,
-                     bus::causeOf(done.failure));
+  remedy_ = tmc::isOnSpi(settings_.model) ? kSpiRemedy : kWireRemedy;
+  return fmt::format("{}, {}", place(), bus::causeOf(done.failure));
 }
 
 std::string TmcChip::takeSetUp(const bus::RegisterDone& done) {
   count(done);
   state_.is_set_up = false;
-  if (done.failure == bus::Failure::kMismatch && done.failed_number == tmc::kIoin) {
+  if (done.failure == bus::Failure::kMismatch &&
+      done.failed_number == tmc::ioinOf(settings_.model)) {
     remedy_ = "give the driver that is there, then start again";
-    return fmt::format("on {} at address {} says that it is {} (version {:02X}h)", config().port,
-                       config().address, nameOfVersion(done.found >> kVersionShift),
+    return fmt::format("{} says that it is {} (version {:02X}h)", place(),
+                       tmc::nameOfVersion(done.found >> kVersionShift),
                        done.found >> kVersionShift);
   }
   if (done.failure != bus::Failure::kNone) return failureText(done);
+  chopconf_ = done.values[done.values.size() - 6];
   kept_power_ = (done.values[done.values.size() - 5] & tmc::kGstatReset) == 0;
   mscnt_ = static_cast<int>(done.values[done.values.size() - 3]);
   const std::uint32_t gstat = done.values[done.values.size() - 2];
-  const std::uint32_t status = done.values.back();
+  const tmc::Status status = tmc::statusOf(settings_.model, done.values.back());
   takeStatus(status);
   std::string fault = faultOf(gstat, status);
   state_.is_set_up = fault.empty();
+  prepared_for_stall_ = false;
   return fault;
 }
 
 std::string TmcChip::takeMode(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
+  chopconf_ = done.values.at(1);
   mscnt_ = static_cast<int>(done.values.back());
   if (done.values.front() == done.values.back()) return "";
   state_.is_set_up = false;
@@ -192,14 +247,15 @@ std::string TmcChip::takeMode(const bus::RegisterDone& done) {
 std::string TmcChip::takePoll(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
-  const std::uint32_t status = done.values.at(1);
-  takeStatus(status);
-  // It is measured in motion, and keeps its value at rest.
-  if (settings_.has_stall_guard && (status & tmc::kStandstill) == 0) {
-    state_.stall_guard = static_cast<int>(done.values.at(2));
+  tmc::Status status = tmc::statusOf(settings_.model, done.values.at(1));
+  std::uint32_t flags = done.values.front();
+  if (settings_.model == tmc::Model::kTmc2209) {
+    status.stall_guard = static_cast<int>(done.values.at(2));
   }
+  if (tmc::isOnSpi(settings_.model) && done.values.at(2) != chopconf_) flags |= tmc::kGstatReset;
+  takeStatus(status);
   mscnt_ = static_cast<int>(done.values.back());  // if it was asked for
-  return faultOf(done.values.front(), status);
+  return faultOf(flags, status);
 }
 
 std::string TmcChip::takeCurrent(const tmc::CurrentScale& scale, const bus::RegisterDone& done) {
@@ -216,41 +272,34 @@ std::string TmcChip::audited(std::int64_t count, int microsteps) {
   return audit_.check(mscnt_, count, microsteps);
 }
 
-void TmcChip::takeStatus(std::uint32_t status) {
-  const auto has = [status](std::uint32_t bit) { return (status & bit) != 0; };
-  stands_still_ = has(tmc::kStandstill);
-  state_.present_current =
-      currentOf(static_cast<int>((status & tmc::kPresentScale) >> tmc::kPresentScaleShift));
-  state_.stealth_chop = has(tmc::kStealthChop);
-  state_.temperature_warning = has(tmc::kOverTemperatureWarning);
-  state_.open_load_a = has(tmc::kOpenLoadA);
-  state_.open_load_b = has(tmc::kOpenLoadB);
-  state_.at_least_celsius = has(tmc::kAbove157)   ? 157
-                            : has(tmc::kAbove150) ? 150
-                            : has(tmc::kAbove143) ? 143
-                            : has(tmc::kAbove120) ? 120
-                                                  : 0;
+void TmcChip::takeStatus(const tmc::Status& status) {
+  stands_still_ = status.standstill;
+  state_.present_current = currentOf(status.present_scale);
+  state_.stealth_chop = status.stealth_chop.value_or(!settings_.spread_cycle);
+  state_.temperature_warning = status.temperature_warning;
+  state_.open_load_a = status.open_load_a;
+  state_.open_load_b = status.open_load_b;
+  state_.at_least_celsius = status.at_least_celsius;
+  // It is measured in motion, and on SPI only in SpreadCycle. At rest it keeps its value.
+  const bool is_measured =
+      status.stall_guard && tmc::isOnSpi(settings_.model) != state_.stealth_chop;
+  if (is_measured && !status.standstill) state_.stall_guard = status.stall_guard;
 }
 
-std::string TmcChip::faultOf(std::uint32_t gstat, std::uint32_t status) {
-  const auto is = [status](std::uint32_t bit) { return (status & bit) != 0; };
+std::string TmcChip::faultOf(std::uint32_t gstat, const tmc::Status& status) {
   if ((gstat & tmc::kGstatReset) != 0) {
     state_.is_set_up = false;
     remedy_ = kResetRemedy;
     return "was reset, and has forgotten its current and its microsteps: its supply failed for a "
            "moment";
   }
-  if (is(tmc::kOverTemperature)) {
+  if (status.over_temperature) {
     remedy_ = kHeatRemedy;
     return "has switched itself off because of over-temperature";
   }
-  for (const auto& [bit, what] : {std::pair{tmc::kShortToGroundA, "coil A to ground"},
-                                  std::pair{tmc::kShortToGroundB, "coil B to ground"},
-                                  std::pair{tmc::kShortToSupplyA, "coil A to the supply"},
-                                  std::pair{tmc::kShortToSupplyB, "coil B to the supply"}}) {
-    if (!is(bit)) continue;
+  if (status.short_circuit != nullptr) {
     remedy_ = kShortRemedy;
-    return fmt::format("reports a short circuit of {}", what);
+    return fmt::format("reports a short circuit of {}", status.short_circuit);
   }
   if ((gstat & tmc::kGstatUndervoltage) != 0) {
     remedy_ = kSupplyRemedy;

@@ -40,6 +40,28 @@ class TmcChip {
   /// Other currents.
   bus::RegisterJob setCurrent(const driver::tmc::CurrentScale& scale) const;
 
+  /// @name A homing to a stall. @pre config().stall
+  /// @{
+  /// The current and the threshold for it. Its value is MSCNT.
+  bus::RegisterJob prepareStall() const;
+  /// From now on the chip tells of a stall at DIAG. @param speed [full steps/s] of the motor
+  bus::RegisterJob armStall(double speed) const;
+  /// SG_RESULT.
+  bus::RegisterJob readLoad() const;
+  /// It tells of no stall any more. Its value is MSCNT.
+  bus::RegisterJob disarmStall() const;
+  /// The registers are as before prepareStall().
+  bus::RegisterJob endStall() const;
+  /// Takes the answers to any of these. @return why it failed; empty if it didn't.
+  std::string takeStall(const bus::RegisterDone& done);
+  /// Takes the answers to endStall().
+  std::string takeEndOfStall(const bus::RegisterDone& done);
+  /// prepareStall() was sent, and endStall() hasn't succeeded yet.
+  bool isPreparedForStall() const { return prepared_for_stall_; }
+  void notePreparedForStall() { prepared_for_stall_ = true; }
+  std::uint64_t ending_stall = 0;  ///< the job of endStall() under way; 0: none
+  /// @}
+
   /// Takes the answers to setUp(). @return why the chip isn't ready; empty if it is.
   std::string takeSetUp(const bus::RegisterDone& done);
   /// Takes the answers to changeMode(). @return why the mode isn't changed; empty if it is.
@@ -85,20 +107,25 @@ class TmcChip {
   using Accesses = std::vector<bus::RegisterAccess>;
 
   bus::RegisterJob jobOf(Accesses accesses) const;
+  bus::RegisterAccess write(std::uint8_t number, std::uint32_t value) const;
   bus::RegisterAccess read(std::uint8_t number, std::uint32_t volatile_bits = 0) const;
   void count(const bus::RegisterDone& done);
   std::string failureText(const bus::RegisterDone& done);
-  void takeStatus(std::uint32_t status);
+  void takeStatus(const driver::tmc::Status& status);
+  bus::RegisterAccess readFlags() const;
+  driver::tmc::Board board() const;
+  std::string place() const;  // "on /dev/serial0 at address 1"
   void noteCurrents();
   double currentOf(int scale) const;  // [A rms]
   /// What of these flags stops the motor.
-  std::string faultOf(std::uint32_t gstat, std::uint32_t status);
+  std::string faultOf(std::uint32_t gstat, const driver::tmc::Status& status);
 
   const config::MotorConfig& motor_;
   driver::tmc::Settings settings_;
-  const std::uint32_t version_;
   driver::DriverState state_;
   std::string remedy_;
+  bool prepared_for_stall_ = false;
+  std::uint32_t chopconf_ = 0;  // as it was read back
   int mscnt_ = 0;
   bool stands_still_ = false;
   bool kept_power_ = false;

@@ -41,7 +41,8 @@ struct Follow {
   /// [microsteps] A full step: steps may be late by ChannelConfig::late_steps of it. 0: each step
   /// may only be late by a quarter of its interval.
   int full_step = 0;
-  /// @name Orders from rest; profiles that continue them keep these. All but the last are for an axis
+  /// @name Orders from rest; profiles that continue them keep these. All but the last are for an
+  /// axis
   ///   with several motors.
   /// @{
   MotorSet still = 0;  ///< these motors make no steps
@@ -99,6 +100,8 @@ struct Command {
     kFollow,    ///< follow the profiles: all of them, or none if one can't be accepted
     kReserve,   ///< the chip's other pins are being written: make no step, ignore the fault line
     kRelease,   ///< ends a reservation
+    kFault,     ///< a chip of the channel has reported a fault over its port, see ramps_at_fault
+    kBlocked,   ///< a chip of the channel has told over its port that its motor is blocked
     kCompare,   ///< the position of an axis switches an output
     kEndMarks,  ///< motions no longer switch an output: what is left of its marks is given up
   };
@@ -110,7 +113,7 @@ struct Command {
   std::size_t marks_count = 0;
   const Compare* compare = nullptr;  ///< for kCompare; valid until the output has handled it
   std::size_t output = 0;            ///< for kCompare and kEndMarks, with the serial
-  int channel = 0;                   ///< for kReserve and kRelease, like all below
+  int channel = 0;                   ///< for all others, like all below
   std::uint64_t serial = 0;
   Nanoseconds ready = 0;  ///< for kRelease: clock time before which no step goes out
   /// The motor's position in the microsteps of a new mode.

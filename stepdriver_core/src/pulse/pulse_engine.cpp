@@ -273,7 +273,12 @@ void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
   }
   if (command.kind == Command::Kind::kCompare) return takeCompare(*command.compare, now);
   Channel& channel = *channels_[static_cast<std::size_t>(command.channel)];
-  if (command.kind == Command::Kind::kRelease) {
+  if (command.kind == Command::Kind::kFault) {
+    const bool ramps = channel.config.ramps_at_fault && channel.kin->isRunning();
+    if (channel.kin->follows() && !ramps) end(channel, EndReason::kChipFault, now);
+  } else if (command.kind == Command::Kind::kBlocked) {
+    if (channel.kin->follows()) end(channel, EndReason::kBlocked, now);
+  } else if (command.kind == Command::Kind::kRelease) {
     channel.release(command);
     for (const auto& output : outputs_) {
       // Its places were counts of the mode before.

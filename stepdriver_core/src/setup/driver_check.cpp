@@ -43,6 +43,11 @@ constexpr std::array<TestedPin, 3> kTestedPins{{{"pins/enable", &config::Pins::e
                                                 {"pins/step", &config::Pins::step, 7},
                                                 {"pins/dir", &config::Pins::dir, 9}}};
 
+/// IOIN of a chip on SPI with the pins at the bits of kToldPins.
+std::uint32_t asOnUart(std::uint32_t ioin) {
+  return (ioin >> 4U & 1U) | (ioin & 1U) << 7U | (ioin >> 1U & 1U) << 9U;
+}
+
 const char* nameOfBit(unsigned bit) {
   for (const ToldPin& pin : kToldPins) {
     if (pin.bit == bit) return pin.name;
@@ -90,20 +95,15 @@ class DriverCheck {
     bool inverted;  // its level is the other one than that of the line
     bool operator==(const Place& other) const { return chip == other.chip && bit == other.bit; }
   };
-  struct Port {
-    std::unique_ptr<bus::ByteStream> stream;
-    std::unique_ptr<bus::RegisterUart> uart;
-  };
 
   void say(bool is_right, std::string text) { findings_.push_back({is_right, std::move(text)}); }
 
-  bus::RegisterUart& uartOf(const config::TmcConfig& tmc) {
-    Port& port = ports_[tmc.port];
-    if (port.uart == nullptr) {
-      port.stream = bus::openPort(tmc.port, tmc.baud, backend_.simulatedSerial(tmc.port));
-      port.uart = std::make_unique<bus::RegisterUart>(*port.stream, tmc.baud);
+  bus::RegisterPort& portOf(const config::TmcConfig& tmc) {
+    std::unique_ptr<bus::RegisterPort>& port = ports_[tmc.port];
+    if (port == nullptr) {
+      port = bus::openPort(tmc.port, tmc.baud, backend_.simulatedSerial(tmc.port));
     }
-    return *port.uart;
+    return *port;
   }
 
   /// @param switches_off its outputs. @return whether the chip is there.
@@ -120,15 +120,16 @@ class DriverCheck {
     job.accesses.erase(last + 1, job.accesses.end());
     bus::RegisterDone done;
     try {
-      done = carryOut(job, uartOf(config), {});
+      done = carryOut(job, portOf(config), {});
     } catch (const bus::PortError& error) {
       done.failure = bus::Failure::kPort;
       done.port_error = error.what();
     }
     const std::string& title = chip.motor->driver.title;
     if (done.failure == bus::Failure::kNone) {
-      say(true, fmt::format("{}: the {} answers on {} at address {}", chip.name, title, config.port,
-                            config.address));
+      const std::string address =
+          config.baud == 0 ? "" : fmt::format(" at address {}", config.address);
+      say(true, fmt::format("{}: the {} answers on {}{}", chip.name, title, config.port, address));
       return true;
     }
     std::string text = fmt::format("{}: the {} {}", chip.name, title, asked.takeSetUp(done));
@@ -145,7 +146,7 @@ class DriverCheck {
       if (std::find(known.begin(), known.end(), address) != known.end()) continue;
       std::uint32_t value = 0;
       const auto failure =
-          uartOf(config).read(static_cast<std::uint8_t>(address), tmc::kIoin, ~0xFF000000U, value);
+          portOf(config).read(static_cast<std::uint8_t>(address), tmc::kIoin, ~0xFF000000U, value);
       if (failure == bus::Failure::kNone) found.push_back(std::to_string(address));
     }
     return found.empty() ? "" : "; but a chip answers at address " + listText(found, "and");
@@ -173,7 +174,7 @@ class DriverCheck {
         const auto index = indexOf(requests, pin.line);
         if (!index) {
           say(true,
-              fmt::format("{}: {} ({}) wasn't tested: it also goes to a driver without a UART",
+              fmt::format("{}: {} ({}) wasn't tested: it also goes to a driver without registers",
                           chips_[i].name, tested.key, pin.line));
           continue;
         }
@@ -182,7 +183,7 @@ class DriverCheck {
     }
   }
 
-  /// Whether a motor without a UART, whose current could be switched, has this line.
+  /// Whether a motor whose driver has no registers, whose current could be switched, has this line.
   bool isOfOthers(const std::string& line) const {
     for (const config::AxisConfig& axis : axes_) {
       for (std::size_t i = 0; i < axis.motors(); ++i) {
@@ -227,9 +228,11 @@ class DriverCheck {
   std::uint32_t ioinOf(const Chip& chip) {
     std::uint32_t value = 0;
     const config::TmcConfig& config = *chip.motor->tmc;
-    const auto failure =
-        uartOf(config).read(static_cast<std::uint8_t>(config.address), tmc::kIoin, 0, value);
-    return failure == bus::Failure::kNone ? value : 0;
+    const tmc::Model model = tmc::modelOf(chip.motor->driver.name);
+    const auto failure = portOf(config).read(static_cast<std::uint8_t>(config.address),
+                                             tmc::ioinOf(model), 0, value);
+    if (failure != bus::Failure::kNone) return 0;
+    return tmc::isOnSpi(model) ? asOnUart(value) : value;
   }
 
   std::string textOf(const Place& place, std::size_t own) const {
@@ -285,7 +288,7 @@ class DriverCheck {
   gpio::Backend& backend_;
   std::vector<Chip> chips_;
   std::map<std::string, std::vector<int>> addresses_;  // by port
-  std::map<std::string, Port> ports_;
+  std::map<std::string, std::unique_ptr<bus::RegisterPort>> ports_;
   std::vector<DriverFinding> findings_;
 };
 

@@ -43,6 +43,13 @@ SwitchPlaces switchPlaces(const AxisConfig& axis, const SimulatedAxis& simulated
   return places;
 }
 
+/// The version that the chip tells; of a TMC2226 that of a TMC2209.
+int versionOf(const std::string& chip) {
+  if (chip == "tmc2208") return 0x20;
+  if (chip == "tmc2130") return 0x11;
+  return chip == "tmc5160" ? 0x30 : 0x21;
+}
+
 sim::Wire wireOf(const config::Pin& pin) { return {pin.line, pin.inverted}; }
 
 std::optional<sim::SwitchSpec> switchOf(const std::optional<config::Endstop>& endstop,
@@ -147,8 +154,7 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
                                 axis.brake->engage_ns};
   }
   if (axis.tmc) {
-    const bool is_2208 = axis.driver.name == "tmc2208";
-    spec.tmc = sim::TmcSpec{axis.tmc->port, axis.tmc->address, is_2208 ? 0x20 : 0x21, true};
+    spec.tmc = sim::TmcSpec{axis.tmc->port, axis.tmc->address, versionOf(axis.driver.name), true};
   }
   spec.load_falls = simulated.load_falls;
   if (simulated.spring_hz > 0.0) {
@@ -159,6 +165,11 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
   spec.max_switch = switchOf(axis.endstop_max, simulated, places.max);
   spec.block_min = simulated.block_min;
   spec.block_max = simulated.block_max;
+  if (axis.homing && axis.homing->kind == config::HomingKind::kStall) {
+    const double scale = config::configUnitsPerUnit(axis.kind);
+    auto& block = axis.homing->at_max ? spec.block_max : spec.block_min;
+    if (!block) block = axis.homing->offset * scale;
+  }
   reportBlock(axis, inputs, spec);
   return spec;
 }

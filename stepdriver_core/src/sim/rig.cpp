@@ -14,6 +14,7 @@
 
 #include "power_relay.h"
 #include "rig_axis.h"
+#include "spi_wire.h"
 #include "stepdriver_core/error.h"
 #include "trace_feed.h"
 #include "uart_wire.h"
@@ -186,12 +187,17 @@ class Rig::Impl {
   std::atomic<int> failing_lines{0};  // those with a write_fault: each write asks
   std::int64_t latest_ns = kForEver;
   std::map<std::string, UartWire> wires;  // by port
+  std::map<std::string, SpiWire> spis;    // by device
 
  private:
   void connectSerial() {
     for (const auto& axis : axes) {
       if (!axis->hasSerial()) continue;
       const TmcSpec& spec = *axis->spec().tmc;
+      if (axis->isOnSpi()) {
+        connectSpi(spec.port, *axis);
+        continue;
+      }
       UartWire::Chip chip;
       chip.address = spec.address;
       chip.has_power = [this, &own = *axis] { return own.serialHasPower(latest_ns); };
@@ -201,6 +207,17 @@ class Rig::Impl {
       };
       wires[spec.port].add(std::move(chip));
     }
+  }
+
+  void connectSpi(const std::string& device, RigAxis& axis) {
+    SpiWire::Chip chip;
+    chip.has_power = [this, &axis] { return axis.serialHasPower(latest_ns); };
+    chip.status = [this, &axis] { return axis.statusByte(latest_ns); };
+    chip.read = [this, &axis](int number) { return axis.readRegister(number, latest_ns); };
+    chip.write = [this, &axis](int number, std::uint32_t value) {
+      axis.writeRegister(number, value, latest_ns);
+    };
+    spis.emplace(device, SpiWire(std::move(chip)));
   }
 
   void couple(const RigCoupling& coupling) const {
@@ -384,6 +401,9 @@ void Rig::setTrouble(const std::string& axis, const TmcTrouble& trouble) {
 
 void Rig::setWireFaults(const std::string& port, const WireFaults& faults) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
+  if (const auto spi = impl_->spis.find(port); spi != impl_->spis.end()) {
+    return spi->second.setFaults(faults);
+  }
   const auto wire = impl_->wires.find(port);
   if (wire == impl_->wires.end()) throw Error("the rig has no chip on the serial port " + port);
   wire->second.setFaults(faults);
@@ -394,15 +414,22 @@ std::uint32_t Rig::registerOf(const std::string& axis, int number) const {
   return impl_->serialAxisOf(axis).writtenRegister(number);
 }
 
-bool Rig::hasSerial(const std::string& port) const { return impl_->wires.count(port) != 0; }
+bool Rig::hasSerial(const std::string& port) const {
+  return impl_->wires.count(port) + impl_->spis.count(port) != 0;
+}
 
 std::vector<std::uint8_t> Rig::onBytes(const std::string& port, const std::uint8_t* bytes,
                                        std::size_t count, bool pause, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   impl_->advance(time_ns);
-  UartWire& wire = impl_->wires.at(port);
-  if (pause) wire.pause();
-  std::vector<std::uint8_t> heard = wire.send(bytes, count);
+  std::vector<std::uint8_t> heard;
+  if (const auto spi = impl_->spis.find(port); spi != impl_->spis.end()) {
+    heard = spi->second.transfer(bytes, count);
+  } else {
+    UartWire& wire = impl_->wires.at(port);
+    if (pause) wire.pause();
+    heard = wire.send(bytes, count);
+  }
   impl_->switchesMoved(impl_->latest_ns);
   return heard;
 }

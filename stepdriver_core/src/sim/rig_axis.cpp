@@ -16,6 +16,8 @@ namespace {
 // Without a step for so long, a chip with registers says that it stands still: 2^20 clocks of 12
 // MHz.
 constexpr std::int64_t kStandstillNs = 87'000'000;
+// Of such a chip.
+constexpr double kFinestMode = 256.0;
 
 const RigAxisSpec& checked(const RigAxisSpec& spec) {
   const std::vector<int>& known = spec.chip.microsteps;
@@ -71,6 +73,7 @@ RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
     chip_.configure(tmc_->configured(), kForEver);
     energized_ = chip_.energized();
   }
+  placeStops();
   settle(kForEver);
 }
 
@@ -174,6 +177,7 @@ void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t 
 
 void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   ++(pulse.forward ? pulses_forward_ : pulses_backward_);
+  step_interval_ns_ = last_pulse_ns_ == kForEver ? kForEver : time_ns - last_pulse_ns_;
   last_pulse_ns_ = time_ns;
   judge(pulse.forward, time_ns);
   for (const Side side : {Side::kMin, Side::kMax}) {
@@ -191,8 +195,9 @@ void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   turnRotor(time_ns);
   rotor_ += static_cast<double>(pulse.moved);
   stepped_ += pulse.moved;
-  if (drives_.empty()) meetBlock(pulse.moved);
+  if (drives_.empty() && !blocksRotor()) meetBlock(pulse.moved);
   if (swing_) swing_->moveField(angleOf(static_cast<double>(pulse.moved)));
+  if (tmc_) measureLoad(pulse, time_ns);
   for (const Drive& drive : drives_) drive.axis->noteMoved(time_ns);
   ++motor_steps_;
   // The loss is in the coupling, not in the rotor: the rotor then still agrees with the translator,
@@ -225,6 +230,21 @@ void RigAxis::snapRotor(std::int64_t time_ns) {
   const double before = rotor_;
   rotor_ = phase + cycle * std::round((rotor_ - phase) / cycle);
   if (swing_ && rotor_ != before) swing_->snap(angleOf(rotor_ - before), time_ns);
+  placeStops();
+}
+
+// [microsteps of the finest mode]
+double RigAxis::atStop(const std::optional<double>& stop, double none) const {
+  if (!stop) return none;
+  return (*stop - spec_.start) * chip_.finest() / spec_.full_step_travel +
+         static_cast<double>(slipped_);
+}
+
+void RigAxis::placeStops() {
+  if (!blocksRotor()) return;
+  constexpr double kNowhere = std::numeric_limits<double>::infinity();
+  swing_->setStops(angleOf(rotor_ - atStop(spec_.block_max, kNowhere)),
+                   angleOf(rotor_ - atStop(spec_.block_min, -kNowhere)));
 }
 
 double RigAxis::angleOf(double microsteps) const {
@@ -234,7 +254,14 @@ double RigAxis::angleOf(double microsteps) const {
 // Without current the friction stops the rotor, and so does the brake.
 void RigAxis::turnIfDue(std::int64_t time_ns) {
   if (!swing_) return;
-  if (!holdsRotor()) return swing_->rest(time_ns);
+  if (!holdsRotor()) {
+    constexpr double kNowhere = std::numeric_limits<double>::infinity();
+    if (blocksRotor())
+      rotor_ =
+          std::clamp(rotor_, atStop(spec_.block_min, -kNowhere), atStop(spec_.block_max, kNowhere));
+    swing_->rest(time_ns);
+    return placeStops();
+  }
   if (swing_->isDue(time_ns)) turnRotor(time_ns);
 }
 
@@ -266,7 +293,11 @@ double RigAxis::motorWay() const {
 }
 
 double RigAxis::carriage() const {
-  if (drives_.empty()) return spec_.start + motorWay();
+  if (drives_.empty()) {
+    const double place = spec_.start + motorWay();
+    if (!blocksRotor()) return place;
+    return std::clamp(place, spec_.block_min.value_or(place), spec_.block_max.value_or(place));
+  }
   double way = 0.0;
   for (const Drive& drive : drives_) way += drive.carriage_way * drive.axis->motorWay();
   return spec_.start + way;
@@ -351,18 +382,50 @@ void RigAxis::mendChip() {
 
 // ---- a serial interface ----
 
-std::uint32_t RigAxis::readRegister(int number, std::int64_t time_ns) const {
+std::uint32_t RigAxis::readRegister(int number, std::int64_t time_ns) {
+  return tmc_->read(number, senses(time_ns));
+}
+
+std::uint8_t RigAxis::statusByte(std::int64_t time_ns) const {
+  return tmc_->statusByte(senses(time_ns));
+}
+
+TmcModel::Senses RigAxis::senses(std::int64_t time_ns) const {
   TmcModel::Senses senses;
   senses.enn = chip_.level(Pin::kEnable);
   senses.step = chip_.level(Pin::kStep);
   senses.dir = chip_.level(Pin::kDir);
   senses.diag = chip_fault_;
   senses.outputs_failed = chip_fault_;
-  senses.lag = swing_ ? swing_->lag() : 0.0;
   const std::int64_t cycle = chip_.cycle();
   senses.mscnt = static_cast<int>((chip_.translator() % cycle + cycle) % cycle);
   senses.standstill = last_pulse_ns_ == kForEver || time_ns - last_pulse_ns_ >= kStandstillNs;
-  return tmc_->read(number, senses);
+  if (!senses.standstill) senses.tstep = tstep();
+  return senses;
+}
+
+// The chip measures it once in a full step, and DIAG tells of a stall while steps come that are
+// fast enough.
+void RigAxis::measureLoad(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
+  const std::int64_t way = std::abs(pulse.moved);
+  way_ += way;
+  lag_over_way_ += std::abs(swing_ ? swing_->lag() : 0.0) * static_cast<double>(way);
+  if (way_ < chip_.finest()) return;
+  const double lag = lag_over_way_ / static_cast<double>(way_);
+  way_ = 0;
+  lag_over_way_ = 0.0;
+  const bool stalls = tmc_->measure(lag, tstep());
+  if (!fault_ || chip_fault_) return;
+  if (!stalls) return fault_->stick({});
+  constexpr double kNsPerClock = 1e3 / 12.0;
+  const double slow = kNsPerClock * tmc_->slowestStall() * kFinestMode / chip_.microsteps();
+  fault_->stick(true, time_ns + std::llround(slow));
+}
+
+std::uint32_t RigAxis::tstep() const {
+  constexpr double kClocksPerNs = 12e-3;
+  const double clocks = kClocksPerNs * static_cast<double>(step_interval_ns_) * chip_.microsteps();
+  return static_cast<std::uint32_t>(std::min(clocks / kFinestMode, double{0xFFFFF}));
 }
 
 void RigAxis::writeRegister(int number, std::uint32_t value, std::int64_t time_ns) {

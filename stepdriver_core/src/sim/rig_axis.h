@@ -65,7 +65,9 @@ class RigAxis {
   bool serialHasPower(std::int64_t time_ns) const {
     return tmc_->spec().has_power && time_ns >= power_from_ns_;
   }
-  std::uint32_t readRegister(int number, std::int64_t time_ns) const;
+  std::uint32_t readRegister(int number, std::int64_t time_ns);
+  std::uint8_t statusByte(std::int64_t time_ns) const;
+  bool isOnSpi() const { return tmc_->isOnSpi(); }
   std::uint32_t writtenRegister(int number) const { return tmc_->written(number); }
   void writeRegister(int number, std::uint32_t value, std::int64_t time_ns);
   void powerChip(bool has_power, std::int64_t time_ns);
@@ -95,10 +97,20 @@ class RigAxis {
   void judge(bool forward, std::int64_t time_ns);
   void breakChip(std::int64_t time_ns);
   void takeRegisters(std::int64_t time_ns);
+  std::uint32_t tstep() const;
+  TmcModel::Senses senses(std::int64_t time_ns) const;
   void meetTrouble(std::int64_t time_ns);
   void mendChip();
   void settle(std::int64_t time_ns);
   void snapRotor(std::int64_t time_ns);
+  /// The chip measures the load: a block stops the rotor itself.
+  bool blocksRotor() const {
+    return tmc_ && swing_ && drives_.empty() && (spec_.block_min || spec_.block_max);
+  }
+  /// The places of the blocks relative to the field, which may have jumped.
+  void placeStops();
+  double atStop(const std::optional<double>& stop, double none) const;
+  void measureLoad(const ChipModel::Pulse& pulse, std::int64_t time_ns);
   /// [electrical rad] The angle of a way of the rotor.
   double angleOf(double microsteps) const;
   /// The motor has current, and no brake holds it.
@@ -153,6 +165,10 @@ class RigAxis {
   std::optional<MotionJudge> judge_;
   bool last_forward_ = false;  // the direction of the last pulse
   std::int64_t last_pulse_ns_ = kForEver;
+  std::int64_t step_interval_ns_ = kForEver;  // between the last two pulses
+  // Since the chip has measured its load.
+  std::int64_t way_ = 0;  // [microsteps of the finest mode]
+  double lag_over_way_ = 0.0;
   std::int64_t power_from_ns_ = kForEver;
   bool powers_up_ = false;  // as soon as the power is there
 };

@@ -57,6 +57,23 @@ void RotorModel::setTorque(double part) {
   settled_ = false;
 }
 
+void RotorModel::setStops(double least, double most) {
+  least_lag_ = least;
+  most_lag_ = most;
+  meetStops();
+}
+
+void RotorModel::meetStops() {
+  if (lag_ <= least_lag_) {
+    lag_ = least_lag_;
+    speed_ = std::min(speed_, 0.0);
+  }
+  if (lag_ >= most_lag_) {
+    lag_ = most_lag_;
+    speed_ = std::max(speed_, 0.0);
+  }
+}
+
 std::int64_t RotorModel::turnTo(std::int64_t time_ns) {
   std::int64_t behind = 0;
   if (!settled_) {
@@ -86,6 +103,7 @@ void RotorModel::turn(double duration, double decay, double gain) {
   const double most = gain * friction_;
   speed_ = speed_ > 0.0 ? std::max(speed_ - most, 0.0) : std::min(speed_ + most, 0.0);
   lag_ -= 0.5 * duration * speed_;
+  meetStops();
   noteLag();
 }
 
@@ -97,6 +115,8 @@ std::int64_t RotorModel::slip() {
   if (std::abs(lag_) < kLost) return 0;
   const double cycles = std::round(lag_ / kCycle);
   lag_ -= cycles * kCycle;
+  least_lag_ -= cycles * kCycle;
+  most_lag_ -= cycles * kCycle;
   slips_ += std::llabs(std::llround(cycles));
   return std::llround(cycles);
 }
@@ -105,13 +125,18 @@ void RotorModel::settle() {
   if (std::abs(speed_) >= kSettled) return;
   const double angle = std::abs(lag_);
   if (std::abs(angle - kPi) < kPi - kCrest) lag_ = std::copysign(kCrest, lag_);
-  settled_ = std::abs(sine(lag_)) < friction_ + kSettled;
+  const double torque = sine(lag_);
+  const bool is_blocked =
+      (lag_ <= least_lag_ && torque > 0.0) || (lag_ >= most_lag_ && torque < 0.0);
+  settled_ = is_blocked || std::abs(torque) < friction_ + kSettled;
   if (settled_) speed_ = 0.0;
   if (angle < kSettled) lag_ = 0.0;
 }
 
 void RotorModel::moveField(double angle) {
   lag_ += angle;
+  least_lag_ += angle;
+  most_lag_ += angle;
   settled_ = false;
   follows_ = true;
   noteLag();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "sim_time.h"
 #include "stepdriver_core/sim/rig.h"
@@ -39,6 +40,10 @@ class RotorModel {
   /// The coils have another current from now on. @param part of the holding torque, above 0
   void setTorque(double part);
 
+  /// The rotor is blocked at both ends of its way: the field leads it by at least `least` and at
+  /// most `most` [electrical rad]. Both move with the field. It doesn't bounce.
+  void setStops(double least, double most);
+
   /// Nothing turns the rotor: it stands where the field was.
   void rest(std::int64_t time_ns);
   /// The field catches a rotor that stands still, this far behind it. That is no lag behind steps.
@@ -60,6 +65,7 @@ class RotorModel {
     return static_cast<double>(time_ns - time_ns_) * 1e-9 * frequency_;
   }
   void turn(double duration, double decay, double gain);
+  void meetStops();
   void noteLag();
   std::int64_t slip();
   void settle();
@@ -70,7 +76,9 @@ class RotorModel {
   double torque_ = 1.0;  // the part of it that the present current makes
   double frequency_;     // the same two with the present current
   double friction_;
-  double lag_ = 0.0;    // [electrical rad]
+  double lag_ = 0.0;                                             // [electrical rad]
+  double least_lag_ = -std::numeric_limits<double>::infinity();  // at the stops
+  double most_lag_ = std::numeric_limits<double>::infinity();
   double speed_ = 0.0;  // the rotor's speed, in units of w
   double largest_lag_ = 0.0;
   std::int64_t slips_ = 0;

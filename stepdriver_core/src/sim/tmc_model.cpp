@@ -8,12 +8,18 @@
 namespace stepdriver::sim {
 namespace {
 
-// TMC2209 datasheet rev. 1.03, section 5. The rig has its own reading of it.
+// TMC2209 datasheet rev. 1.03, section 5, and those of the TMC2130 and TMC5160. The rig has its own
+// reading of them.
 constexpr int kGconf = 0x00;
 constexpr int kGstat = 0x01;
 constexpr int kIfcnt = 0x02;
+constexpr int kIoinOnSpi = 0x04;
 constexpr int kIoin = 0x06;
+constexpr int kGlobalScaler = 0x0B;
 constexpr int kIholdIrun = 0x10;
+constexpr int kTstep = 0x12;
+constexpr int kTpwmthrs = 0x13;
+constexpr int kSgthrs = 0x40;
 constexpr int kSgResult = 0x41;
 constexpr int kMscnt = 0x6A;
 constexpr int kChopconf = 0x6C;
@@ -28,10 +34,14 @@ TmcModel::TmcModel(const TmcSpec& spec) : spec_(spec) { reset(); }
 
 void TmcModel::reset() {
   registers_ = {};
-  registers_[kGconf] = 0x101;  // VREF scales the current, the pins select the microsteps
-  registers_[kIholdIrun] = 0x11F10;
-  registers_[kChopconf] = 0x10000053;
-  registers_[kPwmconf] = 0xC10D0024;
+  if (isOnSpi()) {
+    registers_[kPwmconf] = spec_.version == kVersion2130 ? 0x00050480 : 0xC40C001E;
+  } else {
+    registers_[kGconf] = 0x101;  // VREF scales the current, the pins select the microsteps
+    registers_[kIholdIrun] = 0x11F10;
+    registers_[kChopconf] = 0x10000053;
+    registers_[kPwmconf] = 0xC10D0024;
+  }
   writes_ = 0;
   was_reset_ = true;
   driver_error_ = false;
@@ -40,18 +50,19 @@ void TmcModel::reset() {
 void TmcModel::write(int number, std::uint32_t value) {
   ++writes_;
   if (number == kGstat) {
+    if (spec_.version == kVersion2130) return;
     was_reset_ = was_reset_ && (value & 1U) == 0;
     driver_error_ = driver_error_ && (value & 2U) == 0;
     return;
   }
-  const bool is_read_only =
-      number == kIfcnt || number == kIoin || number == kMscnt || number == kDrvStatus;
+  const bool is_read_only = number == kIfcnt || number == (isOnSpi() ? kIoinOnSpi : kIoin) ||
+                            number == kTstep || number == kMscnt || number == kDrvStatus;
   if (!is_read_only) registers_.at(static_cast<std::size_t>(number)) = value;
   if (number == kIholdIrun && first_run_ == 0) first_run_ = runOf();
 }
 
 int TmcModel::microsteps() const {
-  if ((registers_[kGconf] & 1U << 7U) == 0) {
+  if (!isOnSpi() && (registers_[kGconf] & 1U << 7U) == 0) {
     constexpr std::array<int, 4> kByPins2209{8, 32, 64, 16};
     constexpr std::array<int, 4> kByPins2208{8, 2, 4, 16};
     const auto pins = static_cast<std::size_t>(spec_.address & 3);
@@ -73,49 +84,101 @@ bool TmcModel::outputsOn() const {
   return spec_.has_power && (registers_[kChopconf] & 0xFU) != 0 && !trouble_.undervoltage;
 }
 
-std::uint32_t TmcModel::status(const Senses& senses) const {
+// A TMC5160 scales it by 1/256.
+std::uint32_t TmcModel::runOf() const {
+  const std::uint32_t scale = (registers_[kIholdIrun] >> 8U & 0x1FU) + 1;
+  if (spec_.version != kVersion5160) return scale;
+  const std::uint32_t global = registers_[kGlobalScaler];
+  return scale * (global == 0 ? 256 : global);
+}
+
+std::uint8_t TmcModel::statusByte(const Senses& senses) const {
+  return static_cast<std::uint8_t>(bit(was_reset_, 0) | bit(driver_error_, 1) |
+                                   bit(senses.standstill, 3));
+}
+
+std::uint32_t TmcModel::statusOnSpi(const Senses& senses) const {
   const bool failed = senses.outputs_failed;
   const std::uint32_t hold = registers_[kIholdIrun] & 0x1FU;
   const std::uint32_t run = registers_[kIholdIrun] >> 8U & 0x1FU;
-  const bool stealth = (registers_[kGconf] & 4U) == 0;
+  const bool says_stealth = spec_.version == kVersion5160 && isStealthy(senses.tstep);
+  return (isStealthy(senses.tstep) ? 0 : stall_guard_) | bit(says_stealth, 14) |
+         (senses.standstill ? hold : run) << 16U | bit(trouble_.over_temperature, 25) |
+         bit(trouble_.prewarning || trouble_.over_temperature, 26) |
+         bit(trouble_.short_a && failed, 27) | bit(trouble_.short_b && failed, 28) |
+         bit(trouble_.open_a, 29) | bit(trouble_.open_b, 30) | bit(senses.standstill, 31);
+}
+
+std::uint32_t TmcModel::inputs(const Senses& senses) const {
+  const std::uint32_t version = static_cast<std::uint32_t>(spec_.version) << 24U;
+  if (isOnSpi()) {
+    return version | bit(senses.step, 0) | bit(senses.dir, 1) | bit(senses.enn, 4) | bit(true, 6);
+  }
+  return version | bit(senses.enn, 0) | bit((spec_.address & 1) != 0, 2) |
+         bit((spec_.address & 2) != 0, 3) | bit(senses.diag, 4) | bit(senses.step, 7) |
+         bit(senses.dir, 9);
+}
+
+std::uint32_t TmcModel::gstat() const {
+  return bit(was_reset_, 0) | bit(driver_error_, 1) | bit(trouble_.undervoltage, 2);
+}
+
+std::uint32_t TmcModel::status(const Senses& senses) const {
+  if (isOnSpi()) return statusOnSpi(senses);
+  const bool failed = senses.outputs_failed;
+  const std::uint32_t hold = registers_[kIholdIrun] & 0x1FU;
+  const std::uint32_t run = registers_[kIholdIrun] >> 8U & 0x1FU;
   return bit(trouble_.prewarning || trouble_.over_temperature, 0) |
          bit(trouble_.over_temperature, 1) | bit(trouble_.short_a && failed, 2) |
          bit(trouble_.short_b && failed, 3) | bit(trouble_.open_a, 6) | bit(trouble_.open_b, 7) |
          bit(trouble_.prewarning || trouble_.over_temperature, 8) |
          bit(trouble_.over_temperature, 9) | (senses.standstill ? hold : run) << 16U |
-         bit(stealth, 30) | bit(senses.standstill, 31);
+         bit(isStealthy(senses.tstep), 30) | bit(senses.standstill, 31);
 }
 
-// It falls with the load, which makes the rotor lag: to 0 at the highest torque. At rest it keeps
-// its value.
-std::uint32_t TmcModel::stallGuard(const Senses& senses) const {
-  const bool stealth = (registers_[kGconf] & 4U) == 0;
-  if (stealth && !senses.standstill) {
-    const double load = std::min(std::abs(senses.lag) / (kPi / 2.0), 1.0);
-    stall_guard_ = 2 * static_cast<std::uint32_t>(std::lround(255.0 * (1.0 - load)));
+// Above the speed of TPWMTHRS it chops as in SpreadCycle.
+bool TmcModel::isStealthy(std::uint32_t tstep) const {
+  const bool is_set = (registers_[kGconf] & 4U) != 0;  // en_spreadcycle, on SPI en_pwm_mode
+  return is_set == isOnSpi() && tstep >= registers_[kTpwmthrs];
+}
+
+// SG_RESULT falls with the load, which makes the rotor lag: to 0 at the highest torque. On SPI it
+// has a bit more, and is measured in SpreadCycle only.
+bool TmcModel::measure(double lag, std::uint32_t tstep) {
+  const double load = std::min(lag / (kPi / 2.0), 1.0);
+  if (isOnSpi()) {
+    if (!isStealthy(tstep)) {
+      stall_guard_ = static_cast<std::uint32_t>(std::lround(1023.0 * (1.0 - load)));
+    }
+    return false;
   }
-  return stall_guard_;
+  if (!isStealthy(tstep)) return false;
+  stall_guard_ = 2 * static_cast<std::uint32_t>(std::lround(255.0 * (1.0 - load)));
+  return tstep <= slowestStall() && stall_guard_ <= 2 * registers_[kSgthrs];
 }
 
-std::uint32_t TmcModel::read(int number, const Senses& senses) const {
+std::uint32_t TmcModel::read(int number, const Senses& senses) {
+  if (number == (isOnSpi() ? kIoinOnSpi : kIoin)) return inputs(senses);
   switch (number) {
-    case kGstat:
-      return bit(was_reset_, 0) | bit(driver_error_, 1) | bit(trouble_.undervoltage, 2);
+    case kGstat: {
+      const std::uint32_t flags = gstat();
+      if (spec_.version == kVersion2130) was_reset_ = driver_error_ = false;
+      return flags;
+    }
     case kIfcnt:
-      return writes_;
-    case kIoin:
-      return bit(senses.enn, 0) | bit((spec_.address & 1) != 0, 2) |
-             bit((spec_.address & 2) != 0, 3) | bit(senses.diag, 4) | bit(senses.step, 7) |
-             bit(senses.dir, 9) | static_cast<std::uint32_t>(spec_.version) << 24U;
+      return isOnSpi() ? 0 : writes_;
+    case kTstep:
+      return senses.tstep;
     case kSgResult:
-      return stallGuard(senses);
+      return isOnSpi() ? 0 : stall_guard_;
     case kMscnt:
       return static_cast<std::uint32_t>(senses.mscnt);
     case kDrvStatus:
       return status(senses);
+    case kPwmconf:
+      return isOnSpi() ? 0 : written(number);
     case kGconf:
     case kChopconf:
-    case kPwmconf:
       return written(number);
     default:
       return 0;

@@ -1,6 +1,7 @@
 #include "uart_wire.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "bus/uart_frame.h"
 
@@ -23,7 +24,8 @@ UartWire::Bytes UartWire::carried(const Bytes& bytes) {
 
 std::vector<std::uint8_t> UartWire::send(const std::uint8_t* bytes, std::size_t count) {
   const Bytes echo = carried({bytes, bytes + count});
-  Bytes heard = faults_.no_echo ? Bytes() : echo;
+  Bytes heard = std::exchange(late_, {});
+  if (!faults_.no_echo) heard.insert(heard.end(), echo.begin(), echo.end());
   begun_.insert(begun_.end(), echo.begin(), echo.end());
   while (begun_.size() >= 4) {
     if ((begun_.front() & 0xFU) != bus::kSync) {
@@ -39,7 +41,10 @@ std::vector<std::uint8_t> UartWire::send(const std::uint8_t* bytes, std::size_t 
       break;
     }
     const Bytes answer = carried(answers(frame));
-    heard.insert(heard.end(), answer.begin(), answer.end());
+    for (const std::uint8_t byte : answer) {
+      const bool is_late = !late_.empty() || happens(faults_.late);
+      (is_late ? late_ : heard).push_back(byte);
+    }
   }
   return heard;
 }

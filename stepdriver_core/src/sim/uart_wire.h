@@ -40,6 +40,7 @@ class UartWire {
   std::vector<Chip> chips_;
   WireFaults faults_;
   Bytes begun_;  // a frame that isn't complete
+  Bytes late_;   // on its way to the port
   std::mt19937 random_{1};
 };
 

@@ -56,7 +56,7 @@ void expectAlarm(Bench& bench, const axis::MoveResult& result) {
 TEST(Alarm, EndsTheStepsAtOnceOrByARamp) {
   for (const bool ramps : {false, true}) {
     config::AxisConfig config = alarmAxis(FaultEnd::kReset);
-    config.fault->ramps = ramps;
+    config.fault_ramps = ramps;
     Bench bench({config}, true, kSpeed);
     bench.axis().setPosition(0.0);
     bench.rig.setFaults("x", brokenAfter(2000));
@@ -72,7 +72,7 @@ TEST(Alarm, EndsTheStepsAtOnceOrByARamp) {
 
 TEST(Alarm, BeforeTheFirstStepOfAMotionLeavesNothingToRamp) {
   config::AxisConfig config = alarmAxis(FaultEnd::kReset);
-  config.fault->ramps = true;
+  config.fault_ramps = true;
   Bench bench({config});
   bench.rig.setFaults("x", brokenAfter(0));
   bench.machine->advance(0.2);
@@ -160,7 +160,7 @@ TEST(Alarm, OfADisabledMotorIsEndedBySwitchingItOn) {
 
 TEST(Alarm, BringsTheAxesOfALineToRestOnIt) {
   config::AxisConfig x = alarmAxis(FaultEnd::kReset);
-  x.fault->ramps = true;
+  x.fault_ramps = true;
   Bench bench({x, linearAxis("y")}, true, kSpeed);
   bench.rig.setFaults("x", brokenAfter(2000));
   motion::LineRequest line;
@@ -181,7 +181,7 @@ TEST(Alarm, EndsAHomingByItsRamp) {
   const config::AxisConfig alarm = alarmAxis(FaultEnd::kReset);
   config.driver = alarm.driver;
   config.fault = alarm.fault;
-  config.fault->ramps = true;
+  config.fault_ramps = true;
   Bench bench({config}, true, kSpeed);
   bench.rig.setFaults("x", brokenAfter(500));
   const axis::HomingResult result = bench.axis().home();

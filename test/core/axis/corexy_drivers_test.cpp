@@ -132,7 +132,7 @@ TEST(CoreXyDrivers, ThatReportAFaultStopBothAxesByARamp) {
   test::share(axes, {{1.0, 1.0}, {1.0, -1.0}});
   for (config::AxisConfig& axis : axes) {
     axis.fault = config::FaultPin{axis.name + ".fault"};
-    axis.fault->ramps = true;
+    axis.fault_ramps = true;
   }
   Bench bench(axes, true, 1.0);
   for (const auto& axis : bench.machine->axes()) axis->setPosition(0.0);

@@ -117,10 +117,10 @@ struct Noise {
 };
 class RegisterUartInNoise : public ::testing::TestWithParam<Noise> {};
 
-// A million transactions. Bytes are lost, doubled and damaged: a value that is believed is the
-// chip's, and a write that is believed has changed that register and no other.
+// A million transactions. Bytes are lost, doubled, damaged and late: a value that is believed is
+// the chip's, and a write that is believed has changed that register and no other.
 TEST_P(RegisterUartInNoise, BelievesNoWrongRegister) {
-  constexpr int kTransactions = 250'000;
+  constexpr int kTransactions = 200'000;
   constexpr std::array<std::uint8_t, 6> kWritten{0x00, 0x10, 0x11, 0x22, 0x6C, 0x70};
   test::WiredStream stream;
   sim::TmcModel& chip = stream.add(0);
@@ -166,7 +166,8 @@ INSTANTIATE_TEST_SUITE_P(, RegisterUartInNoise,
                          ::testing::Values(Noise{"LostBytes", {0.01, 0.0, 0.0, false}},
                                            Noise{"DoubledBytes", {0.0, 0.01, 0.0, false}},
                                            Noise{"FlippedBits", {0.0, 0.0, 0.01, false}},
-                                           Noise{"All", {0.01, 0.01, 0.02, false}}),
+                                           Noise{"LateBytes", {0.0, 0.0, 0.0, false, 0.01}},
+                                           Noise{"All", {0.01, 0.01, 0.02, false, 0.01}}),
                          [](const auto& noise) { return noise.param.name; });
 
 TEST(RegisterJob, ReadsBackWhatItWrites) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bus/bus_threads.h"
+#include "bus/register_uart.h"
 #include "support/serial_terminals.h"
 
 namespace stepdriver::bus {
@@ -107,9 +108,9 @@ TEST(BusThreads, OpenAPortAgainThatHasFailed) {
   int opened = 0;
   std::vector<RegisterDone> all;
   BusThreads threads(
-      [&opened](const std::string&, int) -> std::unique_ptr<ByteStream> {
+      [&opened](const std::string&, int baud) -> std::unique_ptr<RegisterPort> {
         if (++opened == 1) throw PortError("not yet");
-        return std::make_unique<Silent>();
+        return std::make_unique<RegisterUart>(std::make_unique<Silent>(), baud);
       },
       false, [] {});
   RegisterJob job;
@@ -126,8 +127,11 @@ TEST(BusThreads, OpenAPortAgainThatHasFailed) {
 }
 
 TEST(BusThreads, EndWhileJobsAreWaiting) {
-  BusThreads threads([](const std::string&, int) { return std::make_unique<Silent>(); }, true,
-                     [] {});
+  BusThreads threads(
+      [](const std::string&, int baud) {
+        return std::make_unique<RegisterUart>(std::make_unique<Silent>(), baud);
+      },
+      true, [] {});
   RegisterJob job;
   job.accesses.resize(1'000);
   for (int i = 0; i < 100; ++i) {

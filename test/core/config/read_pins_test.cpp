@@ -193,7 +193,7 @@ TEST(ReadPins, ReadsTheInPositionPinOfADriverThatHasOne) {
   EXPECT_EQ(config.in_position->line, "GPIO4");
   EXPECT_EQ(config.in_position->bias, Bias::kPullUp);
   EXPECT_EQ(config.in_position->timeout, 0.25);
-  EXPECT_TRUE(config.fault->ramps);
+  EXPECT_TRUE(config.fault_ramps);
   expectIssues(axis, {{"in_position_timeout_ms", 0, "is 0, but must be above 0 and at most 60000"},
                       {"fault_stop", "slowly", "is \"slowly\", but must be at_once or ramp"}});
   put(axis, "driver", "tb6600");

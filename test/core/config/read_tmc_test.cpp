@@ -64,6 +64,46 @@ TEST(ReadTmc, RefusesWrongValues) {
         "makes no other current; read the value off the board"}});
 }
 
+TEST(ReadTmc, StepsOnOneEdgeOrBoth) {
+  ConfigValue axis = tmcAxis();
+  EXPECT_FALSE(readX(axis).stepsOnBothEdges());
+  put(axis, "tmc/step_edges", std::string("both"));
+  EXPECT_TRUE(readX(axis).stepsOnBothEdges());
+  expectIssues(axis, {{"tmc/step_edges", std::string("falling"),
+                       "is \"falling\", but must be one or both"}});
+}
+
+TEST(ReadTmc, TakesTheSpeedAboveWhichItChopsAudibly) {
+  ConfigValue axis = tmcAxis();
+  put(axis, "tmc/spreadcycle_above_mm_s", 30.0);
+  // 16 microsteps and 80 steps/mm: 5 full steps/mm.
+  EXPECT_DOUBLE_EQ(readX(axis).tmc->spread_cycle_above, 150.0);
+  expectIssues(
+      axis, {{"tmc/spreadcycle_above_mm_s", 0.0, "is 0.0, but must be above 0"},
+             {"tmc/spreadcycle_above_mm_s", 0.001,
+              "is 0.001, but must be from 0.00894071 to 9375: the chip compares no other speeds "
+              "with this travel of a step"},
+             {"tmc/spreadcycle_above_mm_s", 9376.0,
+              "is 9376.0, but must be from 0.00894071 to 9375: the chip compares no other speeds "
+              "with this travel of a step"}});
+  put(axis, "tmc/mode", std::string("spreadcycle"));
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/spreadcycle_above_mm_s",
+                                     "is 30.0, but is only for mode stealthchop: the mode is "
+                                     "spreadcycle at each speed"));
+  axis = tmcAxis();
+  put(axis, "tmc/spreadcycle_above_deg_s", 30.0);
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/spreadcycle_above_deg_s",
+                                     "is 30.0, but the axis's speeds are in mm/s: give "
+                                     "/axes/x/tmc/spreadcycle_above_mm_s"));
+}
+
+TEST(ReadTmc, EndsMotionsAtAFaultAsItIsTold) {
+  ConfigValue axis = tmcAxis();
+  EXPECT_FALSE(readX(axis).fault_ramps);
+  put(axis, "fault_stop", std::string("ramp"));
+  EXPECT_TRUE(readX(axis).fault_ramps);
+}
+
 // The current shows that the resistor is wrong by a factor.
 TEST(ReadTmc, RefusesACurrentThatTheBoardCannotMake) {
   ConfigValue axis = tmcAxis();
@@ -85,8 +125,8 @@ TEST(ReadTmc, IsOnlyForChipsWithAUart) {
   ConfigValue axis = tmcAxis();
   put(axis, "driver", std::string("a4988"));
   EXPECT_EQ(issuesOfX(axis), lineOfX("tmc",
-                                     "is given, but is only for tmc2208, tmc2209 and "
-                                     "tmc2226; the driver is the A4988"));
+                                     "is given, but is only for tmc2208, tmc2209, tmc2226, "
+                                     "tmc2130 and tmc5160; the driver is the A4988"));
 }
 
 TEST(ReadTmc, KnowsThatATmc2208HasOneAddress) {
@@ -110,6 +150,51 @@ TEST(ReadTmc, NeedsAnAddressAndARateForEachChipOfAPort) {
   EXPECT_EQ(issuesOf(mapOf({{"x", tmcAxis()}, {"y", second}})),
             Lines{"/axes/y/tmc/baud: is 9600, but must be 115200, as /axes/x/tmc/baud: it is the "
                   "same port"});
+}
+
+ConfigValue spiAxis(const std::string& driver, const std::string& lines = "gpiochip0") {
+  ConfigValue axis = tmcAxis(lines);
+  drop(axis, "tmc/port");
+  drop(axis, "tmc/address");
+  put(axis, "driver", driver);
+  put(axis, "tmc/spi", std::string("/dev/spidev0.0"));
+  return axis;
+}
+
+TEST(ReadTmc, TakesAChipOnSpi) {
+  for (const std::string driver : {"tmc2130", "tmc5160"}) {
+    ConfigValue axis = spiAxis(driver);
+    put(axis, "microsteps", 256);
+    const AxisConfig config = readX(axis);
+    ASSERT_TRUE(config.tmc);
+    EXPECT_EQ(config.tmc->port, "/dev/spidev0.0");
+    EXPECT_EQ(config.tmc->baud, 0);
+    expectIssues(spiAxis(driver),
+                 {{"tmc/spi", std::string("spidev0.0"),
+                   "is \"spidev0.0\", but must be the path of an SPI device, such as "
+                   "\"/dev/spidev0.0\""}});
+    expectMissing(spiAxis(driver), {{"tmc/spi", "a string"}});
+  }
+  EXPECT_EQ(issuesOf(mapOf({{"x", spiAxis("tmc2130")}, {"y", spiAxis("tmc5160", "gpiochip1")}})),
+            Lines{"/axes/y/tmc/spi: is \"/dev/spidev0.0\", but must be another one: it is "
+                  "/axes/x/tmc/spi already"});
+  ConfigValue axis = spiAxis("tmc5160");
+  put(axis, "tmc/address", 1);
+  EXPECT_NE(issuesOfX(axis).front().find("tmc/address: is not known; known here: "),
+            std::string::npos);
+  axis = tmcAxis();
+  put(axis, "tmc/spi", std::string("/dev/spidev0.0"));
+  EXPECT_NE(issuesOfX(axis).front().find("tmc/spi: is not known; "), std::string::npos);
+}
+
+TEST(ReadTmc, KnowsTheCurrentsOfEachChip) {
+  ConfigValue axis = spiAxis("tmc5160");
+  put(axis, "tmc/sense_resistor_mohm", 75.0);
+  put(axis, "tmc/run_current_a", 3.1);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("tmc/run_current_a",
+                    "is 3.1, but must be from 0.0119693 to 3.06412: with a sense resistor of 75.0 "
+                    "mOhm the board makes no other current; read the value off the board"));
 }
 
 TEST(ReadTmc, LeavesNoMicrostepPins) {

@@ -132,8 +132,8 @@ TEST(Chip, ListsTheMicrostepsThatItsPinsSelect) {
 TEST(Chip, IsFoundByTheNameInConfigurations) {
   EXPECT_EQ(driverChipNames(),
             (std::vector<std::string>{"a4988", "drv8825", "tb6600", "tmc2208", "tmc2209", "tmc2226",
-                                      "tmc2130", "drv8434", "lv8729", "tb6560", "dm542", "dm556",
-                                      "cl57t"}));
+                                      "tmc2130", "tmc5160", "drv8434", "lv8729", "tb6560", "dm542",
+                                      "dm556", "cl57t"}));
   for (const std::string& name : driverChipNames()) {
     ASSERT_NE(findDriverChip(name), nullptr) << name;
     EXPECT_EQ(findDriverChip(name), &driverChip(name)) << name;
@@ -161,6 +161,7 @@ TEST(Chip, KeepsTheTimingOfItsDatasheet) {
       {"tmc2209", 200, 200, 20, 1'000, 1'000'000, 0},
       {"tmc2226", 200, 200, 20, 1'000, 1'000'000, 0},
       {"tmc2130", 200, 200, 20, 1'000, 1'000'000, 0},
+      {"tmc5160", 200, 200, 20, 1'000, 1'000'000, 0},
       {"drv8434", 1'000, 1'000, 200, 200, 5'000, 2'000'000},
       {"lv8729", 1'000, 1'000, 500, 500, 1'000'000, 2'000'000},
       {"tb6560", 30'000, 37'000, 15'000, 0, 200'000'000, 0},
@@ -204,7 +205,7 @@ TEST(Chip, KnowsItsPinsAndTheirLevels) {
       {"drv8434", 'H', 'L', '-', 'L', held},   {"lv8729", 'L', 'L', '-', '-', held},
       {"tb6560", 'L', '-', '-', '-', held},    {"dm542", 'L', '-', '-', '-', held},
       {"dm556", 'L', '-', '-', '-', held},     {"cl57t", 'L', '-', '-', 'H', held},
-      {"tmc2226", 'L', '-', '-', 'H', counts}};
+      {"tmc2226", 'L', '-', '-', 'H', counts}, {"tmc5160", 'L', '-', '-', '-', counts}};
   EXPECT_EQ(datasheets.size(), driverChipNames().size());
   for (const LevelFigures& sheet : datasheets) {
     const DriverChip& chip = driverChip(sheet.chip);

@@ -11,6 +11,7 @@
 
 #include "bus/serial_port.h"
 #include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
 #include "support/gantry_bench.h"
@@ -351,6 +352,146 @@ TEST(TmcDrivers, StepOnBothEdgesByTheirRegister) {
   EXPECT_EQ(x.state().fault, "");
   EXPECT_EQ(violationsOf(bench.report()), "");
 }
+
+TEST(TmcDrivers, ChopAudiblyAboveASpeed) {
+  config::AxisConfig config = tmcAxis();
+  config.tmc->spread_cycle_above = 250.0;  // 50 mm/s at 5 full steps/mm
+  Bench bench({config});
+  bench.axis().setPosition(0.0);
+  EXPECT_EQ(bench.rig.registerOf("x", 0x13), 188U);  // 12e6 / (256 * 250)
+  const auto is_silent_at = [&bench](double velocity, double target) {
+    const axis::Move move = bench.axis().moveTo(target, false, velocity);
+    bench.machine->advance(0.7);
+    const bool silent = bench.axis().state().drivers->front().stealth_chop;
+    bench.axis().wait(move);
+    return silent;
+  };
+  EXPECT_TRUE(is_silent_at(0.048, 0.09));
+  EXPECT_FALSE(is_silent_at(0.052, 0.0));
+  EXPECT_TRUE(is_silent_at(0.048, 0.09));
+}
+
+// What its registers say stops the axis as what its fault pin says does.
+TEST(TmcDrivers, EndTheStepsAtOnceOrByARamp) {
+  for (const bool ramps : {false, true}) {
+    config::AxisConfig config = tmcAxis();
+    config.fault_ramps = ramps;
+    Bench bench({config});
+    axis::Axis& x = bench.axis();
+    x.setPosition(0.0);
+    const axis::Move move = x.moveTo(0.09);
+    bench.machine->advance(0.3);
+    sim::TmcTrouble trouble;
+    trouble.undervoltage = true;
+    bench.rig.setTrouble("x", trouble);
+    const axis::MoveResult result = x.wait(move);
+    EXPECT_EQ(result.end, axis::MoveEnd::kFault);
+    EXPECT_EQ(has(result.message, "it stopped too fast"), !ramps) << result.message;
+    EXPECT_PRED2(has, x.state().fault, "undervoltage");
+    EXPECT_FALSE(x.state().moving);
+    EXPECT_EQ(violationsOf(bench.report()), "");
+  }
+}
+
+config::AxisConfig spiAxis(const std::string& driver, const std::string& name = "x",
+                           const std::string& device = "/dev/spidev0.0") {
+  config::AxisConfig config = tmcAxis(name);
+  config.driver = driver::registerChip(driver::driverChip(driver));
+  config.tmc->port = device;
+  config.tmc->baud = 0;
+  return config;
+}
+
+class TmcOnSpi : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(TmcOnSpi, IsSetUpAndMovesAsOneOnAUart) {
+  Bench bench(
+      {spiAxis(GetParam(), "x", "/dev/spidev0.0"), spiAxis(GetParam(), "y", "/dev/spidev0.1")});
+  for (const std::string name : {"x", "y"}) {
+    axis::Axis& axis = bench.axis(name);
+    EXPECT_EQ(axis.state().fault, "");
+    axis.setPosition(0.0);
+    EXPECT_NEAR(axis.state().drivers->front().run_current, 0.79, 0.015);
+    for (const int microsteps : {256, 2, 16}) {
+      axis.setMicrosteps(microsteps);
+      bench.move(0.01, name);
+      bench.machine->advance(1.3);
+      EXPECT_NEAR(bench.report(name).carriage, 10.0, 1e-9);
+      bench.move(0.0, name);
+      bench.machine->advance(1.3);
+      EXPECT_EQ(bench.report(name).microsteps, microsteps);
+      EXPECT_EQ(axis.state().fault, "");
+      EXPECT_TRUE(axis.state().position_valid);
+    }
+    axis.setCurrent(0.4, 0.1);
+    EXPECT_NEAR(axis.state().drivers->front().run_current, 0.39, 0.02);
+    EXPECT_EQ(axis.state().drivers->front().retries, 0U);
+    EXPECT_EQ(violationsOf(bench.report(name)), "");
+  }
+}
+
+TEST_P(TmcOnSpi, TellsItsFaults) {
+  Bench bench({spiAxis(GetParam())});
+  bench.may_exceed_limits = true;
+  axis::Axis& x = bench.axis();
+  const auto expectFault = [&](const char* fault, const std::function<void(bool)>& set) {
+    x.setPosition(0.0);
+    const axis::Move move = x.moveTo(0.09);
+    bench.machine->advance(0.1);
+    set(true);
+    EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kFault) << fault;
+    EXPECT_PRED2(has, x.state().fault, fault);
+    EXPECT_FALSE(x.state().position_valid);
+    set(false);
+    bench.machine->recover();
+    EXPECT_EQ(x.state().fault, "");
+  };
+  expectFault("was reset", [&](bool there) {
+    if (there) bench.rig.brownOut("x");
+  });
+  expectFault("answers with zeros only", [&](bool there) { bench.rig.powerChip("x", !there); });
+  for (const auto& [member, text] :
+       {std::pair{&sim::TmcTrouble::over_temperature, "over-temperature"},
+        std::pair{&sim::TmcTrouble::short_b, "a short circuit of coil B to ground"},
+        std::pair{&sim::TmcTrouble::undervoltage, "undervoltage"}}) {
+    expectFault(text, [&, which = member](bool there) {
+      sim::TmcTrouble trouble;
+      trouble.*which = there;
+      bench.rig.setTrouble("x", trouble);
+    });
+  }
+  x.setPosition(0.0);
+  x.wait(x.moveTo(0.0101));
+  bench.machine->advance(2.0);
+  EXPECT_EQ(x.state().fault, "");
+  sim::RigFaults faults;
+  faults.missed_pulses = 1;
+  bench.rig.setFaults("x", faults);
+  x.wait(x.moveTo(0.0));
+  bench.machine->advance(2.0);
+  EXPECT_PRED2(has, x.state().fault, "is 1 step ");
+}
+
+TEST_P(TmcOnSpi, TellsItsLoadInSpreadCycle) {
+  config::AxisConfig config = spiAxis(GetParam());
+  config.tmc->mode = config::ChopperMode::kSpreadCycle;
+  Bench bench({config});
+  bench.move(0.05);
+  const driver::DriverState driver = bench.axis().state().drivers->front();
+  ASSERT_TRUE(driver.stall_guard);
+  EXPECT_GT(*driver.stall_guard, 510);
+  EXPECT_NEAR(*driver::loadOf(driver), 1.0 - *driver.stall_guard / 1023.0, 1e-12);
+  EXPECT_FALSE(driver.stealth_chop);
+}
+
+TEST_P(TmcOnSpi, IsNamedIfAnotherChipIsThere) {
+  std::vector<sim::RigAxisSpec> rig = Bench::rigAxes({spiAxis(GetParam())});
+  rig[0].tmc->version = rig[0].tmc->version == 0x11 ? 0x30 : 0x11;
+  Bench bench({spiAxis(GetParam())}, rig);
+  EXPECT_PRED2(has, bench.axis().state().fault, "on /dev/spidev0.0 says that it is a TMC");
+}
+
+INSTANTIATE_TEST_SUITE_P(, TmcOnSpi, ::testing::Values("tmc2130", "tmc5160"));
 
 struct Trouble {
   const char* name;

@@ -89,7 +89,7 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   if (variant != 0) configs[2].idle_action = config::IdleAction::kSleep;
   if (variant == 1) {
     configs[0].driver.fault_end = driver::FaultEnd::kEnable;
-    configs[0].fault->ramps = true;
+    configs[0].fault_ramps = true;
   }
   const auto add_brake = [](config::AxisConfig& config) {
     config.brake =

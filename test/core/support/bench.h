@@ -89,7 +89,12 @@ inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
     spec.brake = sim::BrakeSpec{config.brake->line, config.brake->release_level,
                                 config.brake->release_ns, config.brake->engage_ns};
   }
-  if (config.tmc) spec.tmc = sim::TmcSpec{config.tmc->port, config.tmc->address, 0x21, true};
+  if (config.tmc) {
+    const int version = config.driver.name == "tmc2130"   ? 0x11
+                        : config.driver.name == "tmc5160" ? 0x30
+                                                          : 0x21;
+    spec.tmc = sim::TmcSpec{config.tmc->port, config.tmc->address, version, true};
+  }
   spec.min_switch = endstop(config.endstop_min, -100.0);
   spec.max_switch = endstop(config.endstop_max, 100.0);
   return spec;

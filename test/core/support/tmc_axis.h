@@ -10,7 +10,7 @@ namespace stepdriver::test {
 /// linearAxis() with a TMC2209 of 0.11 Ohm on the UART /dev/serial0, at 0.8 A.
 inline config::AxisConfig tmcAxis(const std::string& name = "x", int address = 0) {
   config::AxisConfig config = linearAxis(name, "tmc2209");
-  config.driver = driver::uartChip(config.driver);
+  config.driver = driver::registerChip(config.driver);
   for (config::Pin* pin : {&config.pins.ms1, &config.pins.ms2, &config.pins.ms3, &config.pins.sleep,
                            &config.pins.reset}) {
     pin->line.clear();

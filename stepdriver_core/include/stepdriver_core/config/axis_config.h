@@ -75,8 +75,6 @@ using Endstop = InputSwitch;
 struct FaultPin {
   std::string line;
   Bias bias = Bias::kAsIs;
-  /// At a fault in motion the axis decelerates to rest; false: its steps end at once.
-  bool ramps = false;
 };
 
 /// The in-position output of a closed-loop driver, which a motion waits for at its end.
@@ -106,6 +104,7 @@ enum class HomingKind {
   kIndex,   ///< an index pulse, which comes once a turn of the motor, after a flag's edge or alone
   kBlock,   ///< the place where its motor is blocked
   kDirect,  ///< nothing: it is where it stands
+  kStall,   ///< the place where its driver chip detects a stall, see TmcConfig::stall
 };
 
 /// How an axis finds its zero: at its trigger point. A unit is m on a linear axis, rad on a rotary
@@ -156,6 +155,9 @@ struct MotorConfig {
   std::optional<Endstop> endstop_min;
   std::optional<Endstop> endstop_max;
   std::optional<FaultPin> fault;
+  /// At a fault of the driver in motion, which its fault pin or its registers report, the axis
+  /// decelerates to rest; false: its steps end at once. If one motor has it, all have.
+  bool fault_ramps = false;
   std::optional<InPositionPin> in_position;
   /// [unit] Where its home switch closes, relative to HomingConfig::offset, when the motors are
   /// square.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace stepdriver::config {
@@ -10,8 +11,19 @@ enum class ChopperMode {
   kSpreadCycle,  ///< audible, with more torque at high speeds
 };
 
-/// A driver chip that is configured and diagnosed over its UART. A program that makes its own
-/// config::MotorConfig gives it a driver::uartChip().
+/// How a driver chip detects a stall of its motor (StallGuard), for a homing to it.
+struct StallConfig {
+  /// 0 to 255: SG_RESULT at or below twice this is a stall. It depends on the speed, the current
+  /// and the motor.
+  int threshold = 0;
+  double current = 0.0;  ///< [A rms] of a coil, while it approaches
+  /// 0 to 1023: MSCNT, the place in the electrical cycle, at which the motor is blocked; empty: not
+  /// known. With it the place is found to a microstep, without it to about 4 full steps.
+  std::optional<int> phase;
+};
+
+/// A driver chip that is configured and diagnosed over its UART or SPI. A program that makes its
+/// own config::MotorConfig gives it a driver::registerChip().
 ///
 /// @code{.cpp}
 /// config::TmcConfig tmc;
@@ -19,18 +31,23 @@ enum class ChopperMode {
 /// tmc.sense_resistor = 0.11;  // [Ohm]
 /// tmc.run_current = 0.8;      // [A rms]
 /// config::AxisConfig x;
-/// x.driver = driver::uartChip(driver::driverChip("tmc2209"));
+/// x.driver = driver::registerChip(driver::driverChip("tmc2209"));
 /// x.tmc = tmc;
 /// @endcode
 struct TmcConfig {
-  std::string port;             ///< serial port, such as `/dev/serial0`
-  int baud = 115200;            ///< the same for all chips of a port
-  int address = 0;              ///< MS1 + 2 MS2; 0 on a TMC2208
+  /// Serial port, such as `/dev/serial0`, or SPI device, such as `/dev/spidev0.0`.
+  std::string port;
+  int baud = 115200;            ///< the same for all chips of a port; 0 on SPI
+  int address = 0;              ///< MS1 + 2 MS2; 0 on a TMC2208, and on SPI
   double sense_resistor = 0.0;  ///< [Ohm] of the board
   double run_current = 0.0;     ///< [A rms] of a coil, in motion
   double hold_current = 0.0;    ///< [A rms] at rest, hold_delay after the last step
   double hold_delay = 0.5;      ///< [s]
   ChopperMode mode = ChopperMode::kStealthChop;
+  /// [full steps/s] With kStealthChop: above this speed of the motor it chops as kSpreadCycle does;
+  /// 0: at none.
+  double spread_cycle_above = 0.0;
+  std::optional<StallConfig> stall;
   bool interpolate = true;  ///< the chip divides each microstep into steps of 1/256
 };
 

@@ -143,14 +143,19 @@ constexpr int kFullStepsPerCycle = 4;
 /// the position: the index must exist in both modes.
 bool keepsPosition(std::int64_t index, int from_microsteps, int to_microsteps);
 
-/// Whether this version can configure the chip over its UART.
-bool hasUart(const DriverChip& chip);
+/// How the registers of a chip are reached.
+enum class RegisterBus {
+  kNone,  ///< it has none, or this version doesn't know them
+  kUart,
+  kSpi,
+};
+RegisterBus registerBusOf(const DriverChip& chip);
 
 /// The chip as it is when its registers, and not its pins, select the microsteps: it has each power
-/// of two up to 256, and its address is at MS1 and MS2. A config::MotorConfig with a
-/// config::TmcConfig has this chip.
+/// of two up to 256. On a UART its address is at MS1 and MS2; on SPI the fault pin is DIAG0, which
+/// pulls low. A config::MotorConfig with a config::TmcConfig has this chip.
 ///
-/// @throw Error if hasUart() says no.
-DriverChip uartChip(DriverChip chip);
+/// @throw Error if it has no registers.
+DriverChip registerChip(DriverChip chip);
 
 }  // namespace stepdriver::driver

@@ -6,11 +6,11 @@
 
 namespace stepdriver::driver {
 
-/// What a driver chip has told of itself over its serial port.
+/// What a driver chip has told of itself over its UART or SPI.
 ///
 /// @code{.cpp}
 /// const axis::AxisState x = machine.axis("x").state();
-/// if (x.drivers == nullptr) return;  // none has a serial port
+/// if (x.drivers == nullptr) return;  // none has registers that are known
 /// for (const driver::DriverState& chip : *x.drivers) std::cout << chip.run_current << " A\n";
 /// @endcode
 struct DriverState {
@@ -30,8 +30,13 @@ struct DriverState {
   /// current, and means something only while the chip chops silently. Empty: the chip hasn't
   /// measured it.
   std::optional<int> stall_guard;
+  int highest_stall_guard = 510;   ///< without a load
   std::uint64_t transactions = 0;  ///< reads and writes of its registers that succeeded
   std::uint64_t retries = 0;       ///< that were tried again
 };
+
+/// How much of its capacity the load takes, from 0 to 1, to be compared at the same speed and
+/// current only. Empty: the chip hasn't measured it.
+std::optional<double> loadOf(const DriverState& driver);
 
 }  // namespace stepdriver::driver

@@ -103,11 +103,11 @@ struct MotorSpec {
 /// @param acceleration [full steps/s^2] its highest one
 MotorSpec soundMotor(MotorSpec motor, double rate, double acceleration);
 
-/// The serial interface of a chip on the rig.
+/// The UART or SPI of a chip on the rig.
 struct TmcSpec {
-  std::string port;       ///< as configured: chips of the same port share a wire
+  std::string port;       ///< as configured: chips of the same serial port share a wire
   int address = 0;        ///< as its address pins are strapped
-  int version = 0x21;     ///< of IOIN: 20h of a TMC2208, 21h of a TMC2209
+  int version = 0x21;     ///< of IOIN: 20h TMC2208, 21h TMC2209, 11h TMC2130, 30h TMC5160
   bool has_power = true;  ///< false: it doesn't answer
 };
 
@@ -118,6 +118,8 @@ struct WireFaults {
   double doubled = 0.0;
   double flipped = 0.0;
   bool no_echo = false;  ///< the port doesn't hear what it sends
+  /// From a byte of an answer on, the rest is heard only after the next bytes were sent.
+  double late = 0.0;
 };
 
 /// What a chip with a serial interface measures on the rig.

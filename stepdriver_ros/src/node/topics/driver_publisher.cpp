@@ -6,8 +6,6 @@ namespace stepdriver::ros_node {
 namespace {
 
 constexpr int kDriverQueueSize = 10;
-// SG_RESULT has 9 bits and a value of 0 in the lowest.
-constexpr double kHighestStallGuard = 510.0;
 
 }  // namespace
 
@@ -34,8 +32,7 @@ void DriverPublisher::publish(const axis::AxisState& state, ros::Time stamp) {
     message.open_load_a.push_back(driver.open_load_a);
     message.open_load_b.push_back(driver.open_load_b);
     message.sg_result.push_back(driver.stall_guard.value_or(-1));
-    message.load.push_back(driver.stall_guard ? 1.0 - *driver.stall_guard / kHighestStallGuard
-                                              : -1.0);
+    message.load.push_back(driver::loadOf(driver).value_or(-1.0));
     message.accesses.push_back(driver.transactions);
     message.retries.push_back(driver.retries);
   }

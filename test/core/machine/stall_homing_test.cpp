@@ -1,0 +1,203 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/error.h"
+#include "support/bench.h"
+#include "support/tmc_axis.h"
+
+namespace stepdriver {
+namespace {
+
+using axis::HomingEnd;
+using axis::HomingResult;
+using test::Bench;
+using test::kStep;
+
+constexpr int kCurrents = 0x10;
+constexpr int kChopsAbove = 0x13;
+constexpr int kStallAbove = 0x14;
+constexpr int kStallBelow = 0x40;
+constexpr double kMotorTorque = 0.5;  // [Nm]
+constexpr double kWallAt = -50.0;     // [mm]
+// Where the rotor stands at the wall, MSCNT is 512. The chip has told of the stall when the field
+// is two thirds of a full step further, on average.
+constexpr int kWallPhase = 512 - 171;
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+config::AxisConfig stallAxis(bool has_diag = true) {
+  config::AxisConfig config = test::tmcAxis();
+  config.endstop_min.reset();
+  config.endstop_max.reset();
+  if (has_diag) config.fault = config::FaultPin{"x.diag"};
+  config.tmc->stall.emplace();
+  config.tmc->stall->threshold = 100;
+  config.tmc->stall->current = 0.7;
+  config.homing.emplace();
+  config.homing->kind = config::HomingKind::kStall;
+  config.homing->seek_speed = 0.05;
+  config.homing->pull_off = 0.01;
+  config.homing->max_travel = 0.2;
+  config.homing->offset = -0.05;
+  return config;
+}
+
+/// A machine whose carriage meets a wall, with a friction [parts of the motor's torque].
+struct WithWall {
+  explicit WithWall(const config::AxisConfig& config, double friction = 0.0, bool walled = true)
+      : bench({config}, specs(config, friction, walled)) {
+    bench.may_exceed_limits = true;  // it stops at once
+  }
+  static std::vector<sim::RigAxisSpec> specs(const config::AxisConfig& config, double friction,
+                                             bool walled) {
+    std::vector<sim::RigAxisSpec> rig = Bench::rigAxes({config});
+    rig[0].motor.emplace();
+    rig[0].motor->holding_torque = kMotorTorque;
+    rig[0].motor->friction = friction * kMotorTorque;
+    if (config.fault) rig[0].fault_line = config.fault->line;
+    if (walled) rig[0].block_min = kWallAt;
+    return rig;
+  }
+  axis::Axis& x() { return bench.axis(); }
+  /// [microsteps] By how much the position is wrong, by the carriage at rest.
+  double error() { return (x().state().position - bench.report().carriage / 1e3) / kStep; }
+  void expectRegistersAsBefore() {
+    EXPECT_EQ(bench.rig.registerOf("x", kCurrents) & 0x1F1FU, 0x190CU);
+    EXPECT_EQ(bench.rig.registerOf("x", kStallAbove), 0U);
+    EXPECT_EQ(bench.rig.registerOf("x", kStallBelow), 0U);
+  }
+
+  Bench bench;
+};
+
+class StallHoming : public ::testing::TestWithParam<bool> {};
+
+TEST_P(StallHoming, EndsWhereTheMotorIsBlocked) {
+  WithWall machine(stallAxis(GetParam()));
+  const HomingResult result = machine.x().home();
+  ASSERT_EQ(result.end, HomingEnd::kHomed) << result.message;
+  EXPECT_TRUE(contains(result.message, "x is homed at MSCNT ")) << result.message;
+  EXPECT_TRUE(machine.x().state().homed);
+  EXPECT_EQ(machine.x().state().fault, "");
+  EXPECT_NEAR(machine.x().state().position, -0.04, kStep);
+  // Within an electrical cycle of the wall.
+  EXPECT_LT(std::abs(machine.error()), 64.0);
+  machine.expectRegistersAsBefore();
+  machine.bench.move(0.0);
+  machine.bench.machine->advance(2.0);
+  EXPECT_EQ(machine.x().state().fault, "");
+}
+
+// A hundred of them, from everywhere, at loads of up to 40 % of the torque.
+TEST_P(StallHoming, FindsTheSameMicrostepEachTimeByThePhase) {
+  constexpr int kEach = 20;  // of five loads, by DIAG or by the UART
+  config::AxisConfig config = stallAxis(GetParam());
+  config.tmc->stall->phase = kWallPhase;
+  std::mt19937 random(3);
+  double least = 1e9;
+  double most = -1e9;
+  for (const double friction : {0.0, 0.1, 0.2, 0.3, 0.4}) {
+    WithWall machine(config, friction);
+    for (int i = 0; i < kEach; ++i) {
+      const HomingResult result = machine.x().home();
+      ASSERT_EQ(result.end, HomingEnd::kHomed) << friction << ": " << result.message;
+      machine.bench.machine->advance(0.3);
+      least = std::min(least, machine.error());
+      most = std::max(most, machine.error());
+      machine.x().wait(machine.x().moveTo(-0.03 + 1e-4 * static_cast<double>(random() % 500)));
+    }
+  }
+  EXPECT_LE(most - least, 1.0) << "from " << least << " to " << most << " microsteps";
+  EXPECT_LT(std::abs(most), 64.0);
+}
+
+TEST_P(StallHoming, BeginsAtTheWall) {
+  config::AxisConfig config = stallAxis(GetParam());
+  std::vector<sim::RigAxisSpec> rig = WithWall::specs(config, 0.1, true);
+  rig[0].start = kWallAt + 0.1;
+  Bench bench({config}, rig);
+  bench.may_exceed_limits = true;
+  const HomingResult result = bench.axis().home();
+  ASSERT_EQ(result.end, HomingEnd::kHomed) << result.message;
+  EXPECT_NEAR(bench.axis().state().position * 1e3, bench.report().carriage, 0.4);
+}
+
+// The registers are as before, whatever ends it.
+TEST_P(StallHoming, LeavesItsRegistersWhenItFailsOrIsStopped) {
+  WithWall without(stallAxis(GetParam()), 0.1, false);
+  HomingResult result = without.x().home();
+  EXPECT_EQ(result.end, HomingEnd::kFailed);
+  EXPECT_TRUE(contains(result.message, "didn't detect a stall within max_travel"))
+      << result.message;
+  without.bench.machine->advance(0.3);
+  without.expectRegistersAsBefore();
+  EXPECT_EQ(without.x().state().fault, "");
+
+  WithWall stopped(stallAxis(GetParam()));
+  bool armed = false;
+  result = stopped.x().home([&] {
+    armed = armed || stopped.bench.rig.registerOf("x", kStallAbove) != 0;
+    return armed;
+  });
+  EXPECT_TRUE(armed);
+  EXPECT_EQ(result.end, HomingEnd::kCancelled) << result.message;
+  stopped.bench.machine->advance(0.3);
+  stopped.expectRegistersAsBefore();
+}
+
+TEST_P(StallHoming, IsArmedAtConstantSpeedOnly) {
+  config::AxisConfig config = stallAxis(GetParam());
+  config.tmc->spread_cycle_above = 400.0;
+  WithWall machine(config);
+  double slowest = 1.0;
+  machine.x().home([&] {
+    if (machine.bench.rig.registerOf("x", kStallAbove) != 0 && machine.x().state().moving) {
+      slowest = std::min(slowest, std::abs(machine.x().state().velocity));
+      EXPECT_EQ(machine.bench.rig.registerOf("x", kCurrents) >> 8U & 0x1FU, 21U);
+      EXPECT_EQ(machine.bench.rig.registerOf("x", kChopsAbove), 0U);
+    }
+    return false;
+  });
+  EXPECT_NEAR(slowest, 0.05, 1e-4);
+  EXPECT_EQ(machine.bench.rig.registerOf("x", kChopsAbove), 117U);
+}
+
+TEST_P(StallHoming, FailsIfItsStallsAreAtDifferentPlaces) {
+  config::AxisConfig config = stallAxis(GetParam());
+  config.tmc->stall->threshold = 255;  // each load is a stall
+  WithWall machine(config, 0.1);
+  const HomingResult result = machine.x().home();
+  EXPECT_EQ(result.end, HomingEnd::kFailed) << result.message;
+  EXPECT_TRUE(contains(result.message, "at different places")) << result.message;
+  machine.bench.machine->advance(0.3);
+  machine.expectRegistersAsBefore();
+}
+
+TEST_P(StallHoming, FailsIfTheChipIsLost) {
+  WithWall machine(stallAxis(GetParam()));
+  bool lost = false;
+  const HomingResult result = machine.x().home([&] {
+    if (!lost && machine.x().state().moving) machine.bench.rig.powerChip("x", false);
+    lost = lost || machine.x().state().moving;
+    return false;
+  });
+  EXPECT_EQ(result.end, HomingEnd::kFailed);
+  machine.bench.machine->advance(1.5);
+  EXPECT_TRUE(contains(machine.x().state().fault, "no chip answers")) << machine.x().state().fault;
+}
+
+INSTANTIATE_TEST_SUITE_P(, StallHoming, ::testing::Bool(),
+                         [](const auto& way) { return way.param ? "ByDiag" : "ByTheUart"; });
+
+}  // namespace
+}  // namespace stepdriver
