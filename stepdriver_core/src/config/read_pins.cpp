@@ -52,11 +52,12 @@ bool isLine(const std::string& line) {
   if (colon == std::string::npos) return true;
   const std::string offset = line.substr(colon + 1);
   if (colon == 0 || offset.empty()) return false;
-  // A pin of a board, as "mcu:gpio12". Whoever knows the boards checks its name.
-  if (std::isalpha(static_cast<unsigned char>(offset[0])) != 0) {
-    return std::all_of(offset.begin(), offset.end(), [](unsigned char letter) {
-      return std::isalnum(letter) != 0 || letter == '_' || letter == '.';
-    });
+  // A pin of a board, as "mcu:gpio12" or "mcu:PA5". Whoever knows the boards checks its name.
+  if (std::isalpha(static_cast<unsigned char>(offset.front())) != 0) {
+    const bool is_numbered = std::isdigit(static_cast<unsigned char>(offset.back())) != 0;
+    return is_numbered && std::all_of(offset.begin(), offset.end(), [](unsigned char letter) {
+             return std::isalnum(letter) != 0 || letter == '_' || letter == '.';
+           });
   }
   // Nine digits exceed the number of lines of any chip, and fit into an int.
   return offset.size() <= 9 && offset.find_first_not_of("0123456789") == std::string::npos;
