@@ -19,7 +19,7 @@ constexpr double kIndexMargin = 0.1;  // [turns]
 // A switch that has not come to rest after this many debounce times is broken.
 constexpr int kMostFlagDebounces = 50;
 // How often the way since the flag is compared with a turn: no event tells of it.
-constexpr pulse::Nanoseconds kLookPeriod = 10'000'000;
+constexpr pulse::Nanoseconds kIndexLookPeriod = 10'000'000;
 
 using axis::HomingPhase;
 
@@ -115,7 +115,7 @@ bool HomingToFlag::hasLeft() const {
 
 pulse::Nanoseconds HomingToFlag::lookDue() const {
   const bool awaits_index = config_.kind == config::HomingKind::kIndex && edge_ && !index_;
-  return std::min(flag_.due(), awaits_index ? context().now + kLookPeriod : pulse::kNever);
+  return std::min(flag_.due(), awaits_index ? context().now + kIndexLookPeriod : pulse::kNever);
 }
 
 std::string HomingToFlag::unmet() const {

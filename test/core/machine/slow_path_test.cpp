@@ -29,7 +29,7 @@ using test::PlannedPath;
 
 // The cubics of a quintic may be off by a hundredth of a microstep at each of two steps, and a plan
 // may exceed a speed by a thousandth.
-constexpr double kMostOver = 1.0 + 2.0 * motion::kQuinticError + 0.001;
+constexpr double kMostOverItsSpeed = 1.0 + 2.0 * motion::kQuinticError + 0.001;
 
 PathRequest lines(const std::vector<std::pair<double, double>>& ends_and_speeds) {
   PathRequest request{{"x"}, {}, false, 0.0, 0.0};
@@ -208,7 +208,7 @@ TEST(SlowPath, KeepsItsSpeedBetweenKnotsThatAreAsCloseAsTheyMayBe) {
       shortest =
           std::min(shortest, static_cast<double>(steps[i].first - steps[i - 1].first) * 1e-9);
     }
-    EXPECT_GE(shortest * made.velocity * kMostOver, 1.0);
+    EXPECT_GE(shortest * made.velocity * kMostOverItsSpeed, 1.0);
   }
 }
 

@@ -18,7 +18,7 @@ namespace {
 constexpr int kLooks = 300;
 constexpr Nanoseconds kLook = 10 * kMillisecond;
 // An answer may be lost: the question is repeated after so many looks.
-constexpr int kAsksAgain = 50;
+constexpr int kLooksUntilAskingAgain = 50;
 constexpr int kClockReadings = 8;
 // The first seconds tell how fast its clock is: it is read more often then.
 constexpr Nanoseconds kFirstClockPeriod = 100 * kMillisecond;
@@ -59,7 +59,7 @@ void Board::identify() {
     const Message question = klipper::identify(static_cast<std::uint32_t>(before));
     std::size_t last = kPiece;
     for (int i = 0; i < kLooks && identity_.size() == before && last != 0; ++i) {
-      if (i % kAsksAgain == 0) transport_.send(question.bytes.data(), question.size);
+      if (i % kLooksUntilAskingAgain == 0) transport_.send(question.bytes.data(), question.size);
       transmit(clock_.now());
       link_->await(kLook);
       std::array<std::uint8_t, 4096> bytes{};
@@ -147,7 +147,7 @@ Heard Board::ask(Command command, std::initializer_list<std::uint32_t> arguments
   const std::optional<std::uint32_t> oid =
       arguments.size() == 0 ? std::nullopt : std::optional<std::uint32_t>(*arguments.begin());
   for (int i = 0; i < kLooks; ++i) {
-    if (i % kAsksAgain == 0) send(command, arguments);
+    if (i % kLooksUntilAskingAgain == 0) send(command, arguments);
     if (const auto heard = exchange(answer, oid)) return *heard;
   }
   throw BoardError(fmt::format("the board {} doesn't answer to \"{}\"", name_, formatOf(command)));
