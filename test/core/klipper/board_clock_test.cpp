@@ -14,7 +14,7 @@ namespace {
 constexpr Nanoseconds kSecond = 1'000'000'000;
 
 /// A board's clock that is too fast, and answers that take their time.
-struct Board {
+struct TickCounter {
   double frequency = 12e6;
   double start = 4'000'000'000.0;  // shortly before the end of the counter
   std::int64_t ticks(Nanoseconds time) const {
@@ -22,14 +22,14 @@ struct Board {
   }
 };
 
-void ask(BoardClock& clock, const Board& board, Nanoseconds now, Nanoseconds there,
+void ask(BoardClock& clock, const TickCounter& board, Nanoseconds now, Nanoseconds there,
          Nanoseconds back) {
   clock.add({now, now + there + back, static_cast<std::uint32_t>(board.ticks(now + there))});
 }
 
 TEST(BoardClock, FollowsAClockThatIsTooFastAcrossTheEndOfTheCounter) {
   for (const double ppm : {-300.0, -20.0, 0.0, 50.0, 2'000.0}) {
-    Board board;
+    TickCounter board;
     board.frequency *= 1.0 + ppm * 1e-6;
     BoardClock clock(12e6);
     std::mt19937_64 random(5);
@@ -49,7 +49,7 @@ TEST(BoardClock, FollowsAClockThatIsTooFastAcrossTheEndOfTheCounter) {
 }
 
 TEST(BoardClock, CountsAnswersThatCameQuicklyMoreThanThoseThatWereDelayed) {
-  const Board board;
+  const TickCounter board;
   BoardClock clock(12e6);
   for (int i = 0; i < 60; ++i) {
     const bool delayed = i % 3 == 2;
@@ -63,7 +63,7 @@ TEST(BoardClock, CountsAnswersThatCameQuicklyMoreThanThoseThatWereDelayed) {
 
 // Steps at 1 kHz are converted 50 ms ahead while new answers come: their intervals hardly change.
 TEST(BoardClock, ConvertsWithoutJumpsWhenTheEstimateChanges) {
-  Board board;
+  TickCounter board;
   board.frequency *= 1.0 + 80e-6;
   BoardClock clock(12e6);
   ask(clock, board, 0, 900'000, 100'000);
@@ -86,7 +86,7 @@ TEST(BoardClock, ConvertsWithoutJumpsWhenTheEstimateChanges) {
 }
 
 TEST(BoardClock, TakesTheNewestEstimateAtOnceAtRest) {
-  const Board board;
+  const TickCounter board;
   BoardClock clock(12e6);
   ask(clock, board, 0, 20 * kMillisecond, 0);
   clock.tickAt(0);

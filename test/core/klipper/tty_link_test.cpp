@@ -95,7 +95,7 @@ class BoardOnTerminal {
   std::thread thread_;
 };
 
-std::string refusalOf(const std::string& path, int baud = 250'000) {
+std::string refusalOfPort(const std::string& path, int baud = 250'000) {
   try {
     const TtyLink link("mcu", path, baud);
   } catch (const BoardError& error) {
@@ -105,11 +105,11 @@ std::string refusalOf(const std::string& path, int baud = 250'000) {
 }
 
 TEST(TtyLink, SaysWhyAPortCannotBeUsed) {
-  EXPECT_NE(refusalOf("/nonexistent/port").find("there is no such port"), std::string::npos);
-  EXPECT_NE(refusalOf("/dev/null").find("it is no serial port"), std::string::npos);
+  EXPECT_NE(refusalOfPort("/nonexistent/port").find("there is no such port"), std::string::npos);
+  EXPECT_NE(refusalOfPort("/dev/null").find("it is no serial port"), std::string::npos);
   BoardOnTerminal terminal;
   const TtyLink first("mcu", terminal.port, 250'000);
-  const std::string text = refusalOf(terminal.port);
+  const std::string text = refusalOfPort(terminal.port);
   EXPECT_NE(text.find("another program uses it"), std::string::npos) << text;
   EXPECT_NE(text.find(terminal.port), std::string::npos) << text;
 }
