@@ -273,6 +273,7 @@ TEST(ReadHoming, ADirectHomingIsANumber) {
 
 TEST(ReadHoming, ReadsAFlagAndAnIndex) {
   ConfigValue axis = blockAxis();
+  put(axis, "steps_per_round", 3200);
   drop(axis, "homing/pull_off_mm");
   put(axis, "homing/latch_speed_mm_s", 40.0);
   for (const auto& [kind, wanted] :
