@@ -394,7 +394,8 @@ TEST(NamedInput, ThatBouncesChangesOnceAtItsFirstEdge) {
   options.inputs[0].debounce_ns = 5 * kMillisecond;
   setup::SimulationConfig config;
   config.speed = 0.0;
-  config.inputs["probe"] = {false, 20, 0.7};
+  config.inputs["probe"].bounces = 20;
+  config.inputs["probe"].bounce_ms = 0.7;
   setup::Simulation simulation(axes, {}, {}, config, {}, options.inputs);
   test::UnthreadedMachine machine(axes, simulation.backend(), simulation.clock(), options);
   int changes = 0;
