@@ -27,9 +27,9 @@ TEST(Machine, TakesAllLinesOrNone) {
   pulse::VirtualClock clock;
   gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
   const auto held = backend.request({{"y.step", false, false}}, {});
-  EXPECT_THROW(machine::Machine(configs, backend, clock, {false}), GpioError);
+  EXPECT_THROW(test::UnthreadedMachine(configs, backend, clock), GpioError);
   // All lines are released: they can be requested again.
-  machine::Machine machine({configs[0]}, backend, clock, {false});
+  test::UnthreadedMachine machine({configs[0]}, backend, clock);
   EXPECT_EQ(machine.axes().size(), 1U);
 }
 

@@ -24,7 +24,7 @@ class LateMove : public testing::Test {
       axis.endstop_min.reset();
       axis.endstop_max.reset();
     }
-    machine.emplace(axes, backend, clock, machine::MachineOptions{false});
+    machine.emplace(axes, backend, clock);
     backend.written.clear();
   }
 
@@ -40,7 +40,7 @@ class LateMove : public testing::Test {
   std::size_t writes = 0;
   test::LateClock clock;
   test::SlowBackend backend{clock};
-  std::optional<machine::Machine> machine;
+  std::optional<test::UnthreadedMachine> machine;
 };
 
 // From the beginning to the first edge, from the last edge to the end, and one late write.
