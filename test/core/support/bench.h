@@ -11,7 +11,7 @@
 #include "stepdriver_core/pulse/clock.h"
 #include "stepdriver_core/setup/simulation.h"
 #include "stepdriver_core/sim/rig.h"
-#include "support/unthreaded_machine.h"
+#include "unthreaded_machine.h"
 
 namespace stepdriver::test {
 
