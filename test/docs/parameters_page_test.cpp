@@ -457,8 +457,7 @@ TEST(HomingKinds, HaveTheKeysOnThePageAndNoOthers) {
     }
   }
   std::set<std::string> known;
-  for (const char* kind : {"limit", "flag", "flag_centre", "index", "block", "direct",
-                           "stall"}) {
+  for (const char* kind : {"limit", "flag", "flag_centre", "index", "block", "direct", "stall"}) {
     Node node = homing();
     const ConfigValue only_kind(ConfigValue::Map{{"kind", kind}});
     node.base = with(node.base, "axes/x/homing", &only_kind);

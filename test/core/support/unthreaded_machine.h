@@ -13,8 +13,8 @@ class UnthreadedMachine : public machine::Machine {
   UnthreadedMachine(const std::vector<config::AxisConfig>& axes, gpio::Backend& backend,
                     pulse::Clock& clock, const machine::MachineOptions& options = {},
                     bool threaded = false)
-      : Machine(axes, backend, clock, options,
-                threaded ? ServedBy::kThreads : ServedBy::kCallers) {}
+      : Machine(axes, backend, clock, options, threaded ? ServedBy::kThreads : ServedBy::kCallers) {
+  }
 
   using Machine::advance;
 };
