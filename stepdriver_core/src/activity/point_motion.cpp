@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "point_to_point/acceleration_ramp_down.h"
+#include "point_to_point/approach.h"
 #include "point_to_point/move_between.h"
 #include "profile/position_range.h"
 #include "profile/profile_parts.h"
@@ -35,9 +36,18 @@ std::int64_t limitTarget(const axis::AxisModel& axis, std::int64_t limit, bool u
                          const motion::MotionState& from, const motion::MotionLimits& within) {
   if (!up || axis.backlash() == 0) return limit;
   // If it can't stop before the limit, it comes back to it, and opens the backlash.
-  const double rest = motion::planStop(0, from, within).endPosition().value();
+  const double rest = from.position.value() +
+                      motion::Stop(from.velocity, from.acceleration, within).length().value();
   const bool passes = axis.jointAt(rest) - static_cast<double>(limit) > motion::kNoStep;
   return passes ? limit : limit + axis.backlash();
+}
+
+std::optional<std::int64_t> limitAhead(const axis::AxisModel& axis, const motion::MotionState& from,
+                                       const motion::MotionLimits& within) {
+  const bool up = from.velocity > 0.0;
+  const auto& limit = up ? axis.config.max_position : axis.config.min_position;
+  if (!limit) return std::nullopt;
+  return limitTarget(axis, motion::restingCount(axis.countOf(*limit)), up, from, within);
 }
 
 std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal,
@@ -207,7 +217,11 @@ motion::Profile planStop(const axis::AxisModel& axis, std::int64_t at) {
   // A motion that hasn't begun has nothing ahead of it, but one may be passing its end.
   const double way = (end - from.position).value();
   const bool ends_ahead = way * from.velocity > 0.0 || std::abs(way) < 0.5;
-  if (before.overshoot > 0.0 || !ends_ahead) return motion::planStop(at, from, stopping);
+  if (before.overshoot > 0.0 || !ends_ahead) {
+    // It was planned to turn within the soft limit. What it rests on is a whole step, which may be
+    // the next one.
+    return motion::planStop(at, from, stopping, limitAhead(axis, from, stopping));
+  }
   const std::int64_t count = motion::restingCount(end.value());
   const double between = axis.sharers().empty() ? 0.0 : end.value() - static_cast<double>(count);
   return motion::planBetween(between, from,

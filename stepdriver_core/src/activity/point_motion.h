@@ -44,6 +44,11 @@ std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
 std::int64_t limitTarget(const axis::AxisModel& axis, std::int64_t limit, bool up,
                          const motion::MotionState& from, const motion::MotionLimits& within);
 
+/// The count of limitTarget() for the soft limit in the direction in which the axis moves; empty:
+/// there is none.
+std::optional<std::int64_t> limitAhead(const axis::AxisModel& axis, const motion::MotionState& from,
+                                       const motion::MotionLimits& within);
+
 /// The count at which the motor has to stop a goal that runs(), from a state within limits; empty
 /// without a limit.
 std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goal,

@@ -99,13 +99,7 @@ motion::Profile velocityProfile(const axis::AxisModel& axis, const Goal& goal,
     return motion::planVelocity(at, from, velocity, within, standAt(axis, goal, from, within))
         .profile;
   }
-  const bool up = from.velocity > 0.0;
-  const auto& limit = up ? axis.config.max_position : axis.config.min_position;
-  std::optional<std::int64_t> not_beyond;
-  if (limit) {
-    not_beyond = limitTarget(axis, motion::restingCount(axis.countOf(*limit)), up, from, within);
-  }
-  return motion::planStop(at, from, within, not_beyond);
+  return motion::planStop(at, from, within, limitAhead(axis, from, within));
 }
 
 // Slows down when the timeout is over.

@@ -319,8 +319,12 @@ TEST(BacklashInAllModes, LeavesThePositionValidAndWithinHalfAMicrostepOfTheMode)
 
 // Whatever takes over, the joint rests within its soft limits: with the backlash taken up at the
 // upper one, or opened if the axis had to come back to it.
-TEST(BacklashAtSoftLimits, IsNoWayBeyondThem) {
-  std::mt19937 random(33);
+// In the other three, a stop comes where a motion is about to turn within a microstep of the limit.
+class BacklashAtSoftLimits : public testing::TestWithParam<unsigned> {};
+INSTANTIATE_TEST_SUITE_P(Stories, BacklashAtSoftLimits, testing::Values(33U, 1U, 14U, 49U));
+
+TEST_P(BacklashAtSoftLimits, IsNoWayBeyondThem) {
+  std::mt19937 random(GetParam());
   const auto any = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
