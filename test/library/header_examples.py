@@ -11,13 +11,13 @@ PARAMETERS = (
     " const setup::MachineConfig& config"
 )
 INCLUDES = ("cstring", "iostream", "memory")
-EXAMPLE = re.compile(r"^/// @code\{\.cpp\}\n(.*?)^/// @endcode$", re.MULTILINE | re.DOTALL)
+EXAMPLE = re.compile(r"^ */// @code\{\.cpp\}\n(.*?)^ */// @endcode$", re.MULTILINE | re.DOTALL)
 
 
 def examples(header: pathlib.Path) -> list[str]:
     """The code of a header's examples."""
     return [
-        "\n".join(line[len("/// ") :] for line in found.splitlines())
+        "\n".join(line.partition("///")[2] for line in found.splitlines())
         for found in EXAMPLE.findall(header.read_text(encoding="utf-8"))
     ]
 

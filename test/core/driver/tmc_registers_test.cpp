@@ -107,7 +107,7 @@ TEST(TmcRegisters, NameNoStallGuardOfATmc2208) {
 }
 
 TEST(TmcRegisters, OfAChipOnSpiHaveTheirOwnBits) {
-  const auto valueOf = [](const Settings& settings, std::uint8_t number) {
+  const auto value_of = [](const Settings& settings, std::uint8_t number) {
     std::optional<std::uint32_t> last;
     for (const RegisterValue& value : setUpOf(settings, 16)) {
       EXPECT_NE(value.number, kSlaveconf);
@@ -118,17 +118,17 @@ TEST(TmcRegisters, OfAChipOnSpiHaveTheirOwnBits) {
   Settings settings;
   settings.model = Model::kTmc2130;
   settings.current = {20, 10, kFine};
-  EXPECT_EQ(valueOf(settings, kGconf), 0x24U);  // en_pwm_mode, diag0_error
-  EXPECT_EQ(valueOf(settings, kChopconf), 0x140300C3U);
-  EXPECT_FALSE(valueOf(settings, kGlobalScaler));
+  EXPECT_EQ(value_of(settings, kGconf), 0x24U);  // en_pwm_mode, diag0_error
+  EXPECT_EQ(value_of(settings, kChopconf), 0x140300C3U);
+  EXPECT_FALSE(value_of(settings, kGlobalScaler));
   settings.spread_cycle = true;
-  EXPECT_EQ(valueOf(settings, kGconf), 0x20U);
+  EXPECT_EQ(value_of(settings, kGconf), 0x20U);
   settings.model = Model::kTmc5160;
   settings.current = {31, 15, CurrentRange{false, 128}};
-  EXPECT_EQ(valueOf(settings, kGlobalScaler), 128U);
-  EXPECT_EQ(valueOf(settings, kChopconf), 0x140100C3U);
+  EXPECT_EQ(value_of(settings, kGlobalScaler), 128U);
+  EXPECT_EQ(value_of(settings, kChopconf), 0x140100C3U);
   settings.current.range.global_scaler = 256;
-  EXPECT_EQ(valueOf(settings, kGlobalScaler), 0U) << "0 is 256";
+  EXPECT_EQ(value_of(settings, kGlobalScaler), 0U) << "0 is 256";
 }
 
 TEST(TmcRegisters, TellTheirStatusAtThePlacesOfEachModel) {

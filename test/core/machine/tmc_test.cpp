@@ -434,7 +434,7 @@ TEST_P(TmcOnSpi, TellsItsFaults) {
   Bench bench({spiAxis(GetParam())});
   bench.may_exceed_limits = true;
   axis::Axis& x = bench.axis();
-  const auto expectFault = [&](const char* fault, const std::function<void(bool)>& set) {
+  const auto expect_fault = [&](const char* fault, const std::function<void(bool)>& set) {
     x.setPosition(0.0);
     const axis::Move move = x.moveTo(0.09);
     bench.machine->advance(0.1);
@@ -446,15 +446,15 @@ TEST_P(TmcOnSpi, TellsItsFaults) {
     bench.machine->recover();
     EXPECT_EQ(x.state().fault, "");
   };
-  expectFault("was reset", [&](bool there) {
+  expect_fault("was reset", [&](bool there) {
     if (there) bench.rig.brownOut("x");
   });
-  expectFault("answers with zeros only", [&](bool there) { bench.rig.powerChip("x", !there); });
+  expect_fault("answers with zeros only", [&](bool there) { bench.rig.powerChip("x", !there); });
   for (const auto& [member, text] :
        {std::pair{&sim::TmcTrouble::over_temperature, "over-temperature"},
         std::pair{&sim::TmcTrouble::short_b, "a short circuit of coil B to ground"},
         std::pair{&sim::TmcTrouble::undervoltage, "undervoltage"}}) {
-    expectFault(text, [&, which = member](bool there) {
+    expect_fault(text, [&, which = member](bool there) {
       sim::TmcTrouble trouble;
       trouble.*which = there;
       bench.rig.setTrouble("x", trouble);

@@ -108,7 +108,7 @@ class Bench {
       : Bench(axes, rigAxes(axes), threaded, speed) {}
 
   Bench(const std::vector<config::AxisConfig>& axes, const std::vector<sim::RigAxisSpec>& rig_axes,
-        bool threaded = false, double speed = 0.0, machine::MachineOptions options = {})
+        bool threaded = false, double speed = 0.0, const machine::MachineOptions& options = {})
       : clock(speed),
         trace(std::make_shared<sim::MemoryTrace>()),
         rig(judged(rig_axes, axes), trace, couplings(axes), motorPowerOf(options), ioOf(options)),

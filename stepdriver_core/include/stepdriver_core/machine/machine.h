@@ -327,11 +327,13 @@ class Machine {
   /// a place, until clearPositionCompare(). Nothing else switches it meanwhile, except to its safe
   /// state. Returns when the next motion will.
   ///
-  ///     config::PositionCompare camera;
-  ///     camera.axis = "x";
-  ///     camera.every = config::PositionCompare::Every{0.002, 0.01, 0.21};
-  ///     camera.pulse_ns = 1'000'000;
-  ///     machine.setPositionCompare("camera", camera);
+  /// @code{.cpp}
+  /// config::PositionCompare camera;
+  /// camera.axis = "x";
+  /// camera.every = config::PositionCompare::Every{0.002, 0.01, 0.21};
+  /// camera.pulse_ns = 1'000'000;
+  /// machine.setPositionCompare("camera", camera);
+  /// @endcode
   ///
   /// It is a passage of the joint that counts: with backlash, an input shaper, or axes that share
   /// motors, too. While the position can't be trusted (AxisState::position_valid), during a homing,
