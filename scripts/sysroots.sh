@@ -58,7 +58,7 @@ release=$(. /etc/os-release && printf '%s' "${VERSION_CODENAME:-$ID}")
 # keep NAME COMMAND...: sets `unpacked` to the folder of that name. If it doesn't exist yet, the command gets the
 # path of a new one and fills it.
 keep() {
-  unpacked=$cache/$release-$1
+  unpacked=$cache/$release-$1-$(md5sum <<<"${*:3}" | cut -c 1-8)  # other packages have a folder of their own
   [[ ! -d $unpacked ]] || return 0
   say "Unpacking packages of $arch into $unpacked"
   new=$(mktemp -d "$cache/.new.XXXXXX")
