@@ -128,7 +128,7 @@ class HomingToStall final : public Homing {
   const config::StallConfig stall_;
   Waits waits_ = Waits::kNothing;
   std::uint64_t job_ = 0;
-  motor::StepAudit audit_;  // of this homing: its direction
+  motor::StepAudit audit_;  // tells in which direction MSCNT counts on the way to the stall
   pulse::Nanoseconds at_speed_since_ = pulse::kNever;
   pulse::Nanoseconds look_at_ = pulse::kNever;
   bool armed_ = false;

@@ -19,7 +19,6 @@
 #include "support/constants.h"
 #include "support/planned_path.h"
 #include "trajectory/path_reader.h"
-#include "trajectory/spline.h"
 
 // Paths whose lengths, speeds, accelerations, jerks and tolerances are drawn over many decades:
 // what their steps say, not their plans.
@@ -182,12 +181,6 @@ class Hull {
 
 // The microstep itself, half a one of each axis, and what the plan may deviate by.
 constexpr double kNear = 1.0 + 0.71 + 0.2;
-// A speed that is measured between two steps, a microstep apart, may be this much too high: each of
-// them may come too soon or too late by the part of a microstep by which cubics deviate from a
-// quintic. What a plan exceeds a speed by, it is slowed down by as a whole, except from a speed: a
-// thousandth is left then. The speed that is allowed is the highest one of all that is within the
-// tolerance, so a rounded corner adds nothing.
-constexpr double kMostOver = 1.0 + 2.0 * motion::kQuinticError + 0.001;
 constexpr double kRounding = 2e-9;  // [s] the times of two steps are rounded by this
 
 // Also of what happens in the shortest time between two knots.
@@ -222,7 +215,7 @@ void expectGoodSteps(const Drawn& drawn, const PlannedPath& path) {
     const double interval = static_cast<double>(step.time - before.time) * 1e-9;
     const double asked = hull.speedNear(place, drawn.request.tolerance + kNear + 1.0);
     const double allowed = std::min(drawn.axes[step.axis].limits.max_speed, asked);
-    ASSERT_GE((interval + kRounding) * allowed * kMostOver, 1.0)
+    ASSERT_GE((interval + kRounding) * allowed * test::kMostOverSpeed, 1.0)
         << "between steps to " << place[0] << ' ' << place[1] << " at " << step.time << " ns, "
         << interval << " s apart; " << allowed << " /s are allowed";
   }

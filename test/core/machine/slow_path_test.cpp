@@ -11,7 +11,6 @@
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "support/constants.h"
 #include "support/planned_path.h"
-#include "trajectory/spline.h"
 
 // Paths on which a ramp lasts microseconds and the way at constant speed minutes: what the plan
 // leaves out of the ramp must not change the way.
@@ -26,10 +25,6 @@ using test::pathAxis;
 using test::PathAxisLimits;
 using test::planned;
 using test::PlannedPath;
-
-// The cubics of a quintic may be off by a hundredth of a microstep at each of two steps, and a plan
-// may exceed a speed by a thousandth.
-constexpr double kMostOverItsSpeed = 1.0 + 2.0 * motion::kQuinticError + 0.001;
 
 PathRequest lines(const std::vector<std::pair<double, double>>& ends_and_speeds) {
   PathRequest request{{"x"}, {}, false, 0.0, 0.0};
@@ -208,7 +203,7 @@ TEST(SlowPath, KeepsItsSpeedBetweenKnotsThatAreAsCloseAsTheyMayBe) {
       shortest =
           std::min(shortest, static_cast<double>(steps[i].first - steps[i - 1].first) * 1e-9);
     }
-    EXPECT_GE(shortest * made.velocity * kMostOverItsSpeed, 1.0);
+    EXPECT_GE(shortest * made.velocity * test::kMostOverSpeed, 1.0);
   }
 }
 

@@ -14,11 +14,19 @@
 #include "trajectory/path_plan.h"
 #include "trajectory/prepared_trajectory.h"
 #include "trajectory/queued_path.h"
+#include "trajectory/spline.h"
 #include "trajectory/trajectory_path.h"
 
 // Paths from the request to the steps that come out, without a machine.
 
 namespace stepdriver::test {
+
+/// A speed that is measured between two steps, a microstep apart, may be this much too high: each
+/// of them may come too soon or too late by the part of a microstep by which cubics deviate from a
+/// quintic. What a plan exceeds a speed by, it is slowed down by as a whole, except from a speed: a
+/// thousandth is left then. The speed that is allowed is the highest one of all that is within the
+/// tolerance, so a rounded corner adds nothing.
+inline constexpr double kMostOverSpeed = 1.0 + 2.0 * motion::kQuinticError + 0.001;
 
 /// An axis at rest at 0, without a start speed, a backlash or soft limits.
 struct PathAxisLimits {

@@ -251,16 +251,16 @@ void Board::serve(Nanoseconds now) {
   }
 }
 
+void Board::failLine(int error, Nanoseconds now) {
+  fail(error, fmt::format("the line to the board {} has failed: {}", name_, gpio::errorText(error)),
+       now);
+}
+
 void Board::receive(Nanoseconds now) {
   std::array<std::uint8_t, 4096> bytes{};
   for (;;) {
     const auto count = link_->read(bytes.data(), bytes.size());
-    if (count < 0) {
-      return fail(static_cast<int>(-count),
-                  fmt::format("the line to the board {} has failed: {}", name_,
-                              gpio::errorText(static_cast<int>(-count))),
-                  now);
-    }
+    if (count < 0) return failLine(static_cast<int>(-count), now);
     if (count == 0) return;
     for (std::ptrdiff_t at = 0; at < count;) {
       at += static_cast<std::ptrdiff_t>(
@@ -312,12 +312,7 @@ void Board::transmit(Nanoseconds now) {
     const auto& out = transport_.out();
     if (out.empty()) return;
     const auto count = link_->write(out.data(), out.size());
-    if (count < 0) {
-      return fail(static_cast<int>(-count),
-                  fmt::format("the line to the board {} has failed: {}", name_,
-                              gpio::errorText(static_cast<int>(-count))),
-                  now);
-    }
+    if (count < 0) return failLine(static_cast<int>(-count), now);
     if (count == 0) return;
     transport_.written(static_cast<std::size_t>(count));
   }

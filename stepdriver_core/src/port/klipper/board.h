@@ -121,6 +121,8 @@ class Board {
   void keepTime(Nanoseconds now);
   void keepOutputs(Nanoseconds now);
   void fail(int error, const std::string& reason, Nanoseconds now);
+  /// The line to the board has failed with this errno.
+  void failLine(int error, Nanoseconds now);
 
   const std::string name_;
   const std::unique_ptr<Link> link_;
