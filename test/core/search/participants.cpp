@@ -1623,7 +1623,8 @@ void Participants::checkCompared() {
   if (tool.compare == 0 || tool.muted || tool.too_long || y.following != 0 || pins_failed_) return;
   const config::OutputConfig& config = optionsOf(schedule_.variant).outputs[0];
   if (clock_.now() < tool.changed + config.min_on_ns) return;
-  const machine::AxisSnapshot& now = controller_->snapshot()->axes[kCompared];
+  const auto snapshot = controller_->snapshot();
+  const machine::AxisSnapshot& now = snapshot->axes[kCompared];
   const double place = static_cast<double>(y.count - y.slack) + y.between;
   const auto count_of = [&now](double at) { return (at - now.origin) * now.steps_per_unit; };
   const double to_edge = std::min(place - count_of(kToolCam.from), count_of(kToolCam.to) - place);
