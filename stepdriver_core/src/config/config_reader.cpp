@@ -178,11 +178,11 @@ std::optional<int> ConfigReader::findInteger(const std::string& key, int min, in
 }
 
 std::optional<int> ConfigReader::findOneOf(const std::string& key, const std::vector<int>& allowed,
-                                           Presence presence) {
+                                           Presence presence, const std::string& hint) {
   std::vector<std::string> words;
   words.reserve(allowed.size());
   for (const int one : allowed) words.push_back(std::to_string(one));
-  const std::string wanted = listText(words);
+  const std::string wanted = listText(words) + hint;
   const ConfigValue* value = find(key, presence, wanted);
   if (value == nullptr) return {};
   const int* integer = value->as<int>();

@@ -69,8 +69,9 @@ class ConfigReader {
   /// @{
   std::optional<double> findNumber(const std::string& key, const Range& range, Presence presence);
   std::optional<int> findInteger(const std::string& key, int min, int max, Presence presence);
+  /// @param hint follows the allowed values in a message.
   std::optional<int> findOneOf(const std::string& key, const std::vector<int>& allowed,
-                               Presence presence);
+                               Presence presence, const std::string& hint = "");
   std::optional<bool> findBoolean(const std::string& key, Presence presence);
   /// A text with control characters is an issue: it could forge a line of a log.
   ///

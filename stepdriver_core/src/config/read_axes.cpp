@@ -42,7 +42,15 @@ std::optional<int> readMicrosteps(ConfigReader& axis, const std::vector<MotorChi
     axis.contradiction("motors", "have drivers with no number of microsteps in common");
     return {};
   }
-  if (modes) return axis.findOneOf("microsteps", *modes, Presence::kRequired);
+  const auto has_unused_registers = [](const MotorChip& motor) {
+    return motor.chip && !motor.tmc &&
+           driver::registerBusOf(*motor.chip) != driver::RegisterBus::kNone;
+  };
+  if (modes) {
+    const bool by_registers = std::all_of(chips.begin(), chips.end(), has_unused_registers);
+    return axis.findOneOf("microsteps", *modes, Presence::kRequired,
+                          by_registers ? "; with a section tmc: also by registers, 1 to 256" : "");
+  }
   return axis.findInteger("microsteps", 1, kFinestMicrosteps, Presence::kRequired);
 }
 

@@ -45,6 +45,16 @@ TEST(ReadTmc, HasEachPowerOfTwoAsMicrosteps) {
             lineOfX("microsteps", "is 5, but must be 1, 2, 4, 8, 16, 32, 64, 128 or 256"));
 }
 
+TEST(ReadTmc, IsHintedAtIfOnlyItsRegistersHaveTheMicrosteps) {
+  ConfigValue axis = linearAxis();
+  put(axis, "driver", std::string("tmc2209"));
+  put(axis, "microsteps", 256);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("microsteps",
+                    "is 256, but must be 8, 16, 32 or 64; with a section tmc: also "
+                    "by registers, 1 to 256"));
+}
+
 TEST(ReadTmc, RefusesWrongValues) {
   expectIssues(
       tmcAxis(),
