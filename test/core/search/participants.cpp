@@ -891,6 +891,13 @@ void Participants::passes(std::size_t motor) {
   }
 }
 
+namespace {
+
+// [s] All segments of a trajectory that is posted here take as long as its first.
+double firstSegmentTime(bool begins_later) { return begins_later ? 0.4 : 0.25; }
+
+}  // namespace
+
 void Participants::beginHulls(const Ask& asked) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const bool moves = asked.meaning.moves && asked.meaning.axes[axis];
@@ -917,12 +924,13 @@ void Participants::widenHull(const Ask& asked, std::size_t axis) {
   if (waits_[axis] || !mayRest(axis, asked.id)) {
     hull.allow(here - stoppingWay(axis), here + stoppingWay(axis));
   }
-  if (asked.begins_later) {
-    waits_[axis] = true;
-    // Wherever it moves when its first segment of 0.4 s begins.
-    const double swing = 0.4 * configs_[axis].max_speed * scale / 4.0;
-    hull.widen(swing + stoppingWay(axis));
+  const bool is_trajectory = std::holds_alternative<machine::FollowTrajectory>(asked.request);
+  if (asked.begins_later || (is_trajectory && !mayRest(axis, asked.id))) {
+    // Its first segment begins at whatever speed the axis then has.
+    const double swing = firstSegmentTime(asked.begins_later) * configs_[axis].max_speed / 4.0;
+    hull.widen(swing * scale + stoppingWay(axis));
   }
+  waits_[axis] |= asked.begins_later;
   if (const auto& reach = asked.meaning.reaches[axis]) {
     if (reach->from_path) {
       const auto* begun = std::get_if<machine::FollowTrajectory>(&asked.request);
@@ -1163,7 +1171,7 @@ void Participants::prepareAndPost(int client, const Wish& wish, int tries) {
   static constexpr std::array<double, 3> speeds = {3.0, 0.0, 0.0};
   std::vector<motion::TrajectoryPoint> points(places.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    points[i].time = (wish.begin_in > 0 ? 0.4 : 0.25) * static_cast<double>(i + 1);
+    points[i].time = firstSegmentTime(wish.begin_in > 0) * static_cast<double>(i + 1);
     points[i].positions.assign(axes.size(), places.at(i) * wish.size);
     points[i].velocities.assign(axes.size(), speeds.at(i) * wish.size);
     points[i].accelerations.assign(axes.size(), 0.0);
