@@ -29,6 +29,7 @@ class DebouncedInput {
   /// errno of its last reading; 0: it could be read.
   int error() const { return level_ && *level_ < 0 ? -*level_ : 0; }
   int line() const { return line_; }
+  bool activeLevel() const { return active_level_; }
   pulse::Nanoseconds debounce() const { return debounce_; }
   /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const;

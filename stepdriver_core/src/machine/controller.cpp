@@ -87,12 +87,14 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   std::visit([this](const auto& what) { on(what); }, input.what);
   // Before motions that begin in this turn.
   superviseCompares();
+  pollLatches();
   activities_.poll();
   supervise();
   while (supervisePower() || superviseOutputs()) {
   }
   superviseCompares();
   requests_.named.inputs.poll(context_);
+  pollLatches();  // a motion that has ended now ends its latch
   showIo();
   if (!requests_.named.outputs.areBeingWritten()) stops_concluded_ = context_.stops_handled;
   context_.pin_done.reset();
@@ -107,9 +109,18 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   context_.beginTurn(last_);
 }
 
+void Controller::pollLatches() {
+  for (const PositionLatches::Ending& ending : requests_.latches.poll(context_)) {
+    for (const axis::AxisModel* axis : ending.axes) {
+      activities_.end(*axis, {axis::MoveEnd::kStopped, ending.why});
+    }
+  }
+}
+
 pulse::Nanoseconds Controller::due() const {
-  pulse::Nanoseconds due = std::min({activities_.due(), context_.motor_power.due(),
-                                     requests_.named.outputs.due(), requests_.named.inputs.due()});
+  pulse::Nanoseconds due =
+      std::min({activities_.due(), context_.motor_power.due(), requests_.named.outputs.due(),
+                requests_.named.inputs.due(), requests_.latches.due()});
   for (const auto& axis : context_.axes) due = std::min(due, idleDue(*axis));
   return due;
 }

@@ -39,7 +39,7 @@ class Controller {
   /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
   bool watchesInputs() const {
     return activities_.watchInputs() || context_.motor_power.watchesInputs() ||
-           requests_.named.inputs.areWatched();
+           requests_.named.inputs.areWatched() || requests_.latches.areWatched();
   }
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
@@ -62,6 +62,7 @@ class Controller {
   void update(axis::AxisModel& axis, const pulse::ChannelState& state);
   void handleStops(const EngineNews& news);
   void supervise();
+  void pollLatches();
   bool supervisePower();
   bool motorsMayLosePower() const;
   bool superviseOutputs();

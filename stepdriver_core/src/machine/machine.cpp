@@ -20,6 +20,8 @@
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "port/port_backend.h"
+#include "printable.h"
+#include "probing.h"
 #include "pulse/measure.h"
 #include "pulse/pulse_engine.h"
 #include "read_options.h"
@@ -53,7 +55,7 @@ class Machine::Impl {
  public:
   Impl(const std::vector<config::AxisConfig>& configs, gpio::Backend& backend, pulse::Clock& clock,
        const MachineOptions& options, bool threaded)
-      : clock_(clock), disposer_(threaded), outputs_(options.outputs) {
+      : clock_(clock), disposer_(threaded), outputs_(options.outputs), inputs_(options.inputs) {
     checkConfiguration(configs, options);
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
@@ -147,18 +149,113 @@ class Machine::Impl {
     throw Refused(fmt::format("there is no axis {} (axes: {})", name, allNames()));
   }
 
+  BeginLatch latchOf(const LatchRequest& request) {
+    BeginLatch begin;
+    begin.wanted = request;
+    const auto input =
+        std::find_if(inputs_.begin(), inputs_.end(),
+                     [&](const config::InputConfig& any) { return any.name == request.input; });
+    if (input == inputs_.end()) {
+      throw Refused(fmt::format("there is no input {} (inputs: {})", printable(request.input),
+                                joinedText(inputs_, [](const auto& any) { return any.name; })));
+    }
+    begin.input = static_cast<std::size_t>(input - inputs_.begin());
+    if (!request.axes.empty()) begin.axes = idsOf(request.axes);
+    for (AxisId id = 0; request.axes.empty() && id < axes_.size(); ++id) begin.axes.push_back(id);
+    if (const auto& window = request.window) {
+      begin.window_axis = idOf(window->axis);
+      if (!(window->from <= window->to)) {
+        throw Refused(
+            fmt::format("the window of the latch is from {} to {}, but must be from a "
+                        "lower position to a higher one",
+                        numberText(window->from), numberText(window->to)));
+      }
+    }
+    begin.id = ++latches_;
+    begin.record = std::make_shared<LatchRecord>();
+    return begin;
+  }
+
+  /// @return when it has ended. @throw Refused
+  ProbeStrokeResult probeStroke(Machine& machine, ProbeStroke stroke,
+                                const std::function<bool()>& cancelled) {
+    std::vector<std::string> names;
+    for (const AxisId id : stroke.line.axes) names.push_back(axes_[id]->config().name);
+    const auto record = stroke.latch ? stroke.latch->record : nullptr;
+    const CoordinatedMove line = moveOf(names, ask(*shell_, std::move(stroke)));
+    ProbeStrokeResult ended;
+    for (const CoordinatedMove::Member& member : line.members) {
+      ended.begin.push_back(machine.axis(member.axis).state().position);
+      ended.targets.push_back(member.move.target);
+    }
+    const auto is_over = [&] { return result(line) && (!record || record->result()); };
+    shell_->wait(
+        [&] {
+          if (is_over()) return true;
+          ended.was_cancelled = cancelled && cancelled();
+          return ended.was_cancelled;
+        },
+        static_cast<bool>(cancelled));
+    if (ended.was_cancelled) {
+      machine.stop(line);
+      shell_->wait(is_over);
+    }
+    ended.line = *result(line);
+    if (record) ended.latched = *record->result();
+    return ended;
+  }
+
+  ProbeResult probe(Machine& machine, const ProbeRequest& request,
+                    const std::function<bool()>& cancelled) {
+    ProbeStroke first;
+    first.line = lineOf(request.names, request.positions);
+    first.line.relative = request.relative;
+    const auto now = shell_->snapshot();
+    for (const AxisId id : first.line.axes) first.stops.push_back(now->axes.at(id).state.stops);
+    LatchRequest latch;
+    latch.input = request.input;
+    latch.edge = request.away ? LatchEdge::kInactive : LatchEdge::kActive;
+    latch.axes = request.names;
+    bool is_first = true;
+    const auto stroke_to = [&](const std::vector<double>& positions) {
+      ProbeStroke stroke = first;
+      stroke.is_first = std::exchange(is_first, false);
+      if (!stroke.is_first) stroke.line.continueTo(positions);
+      return stroke;
+    };
+    Probing::Means means;
+    means.touch = [&](const std::vector<double>& positions, double velocity) {
+      ProbeStroke stroke = stroke_to(positions);
+      stroke.line.velocity = velocity;
+      stroke.latch = latchOf(latch);
+      return probeStroke(machine, std::move(stroke), cancelled);
+    };
+    means.go_back = [&](const std::vector<double>& positions) {
+      return probeStroke(machine, stroke_to(positions), cancelled);
+    };
+    return Probing(request, std::move(means)).run();
+  }
+
   std::string allNames() const {
     return joinedText(axes_, [](const auto& axis) { return axis->config().name; });
   }
 
+  MoveLine lineOf(const std::vector<std::string>& names,
+                  const std::vector<double>& positions) const {
+    MoveLine line;
+    line.axes = idsOf(names);
+    line.positions = positions;
+    if (positions.size() == line.axes.size()) return line;
+    throw Refused(
+        fmt::format("there are {} names, but {} positions", line.axes.size(), positions.size()));
+  }
+
   CoordinatedMove moveLine(const motion::LineRequest& request) {
-    const std::vector<AxisId> axes = idsOf((request.names));
-    if (request.positions.size() != axes.size()) {
-      throw Refused(fmt::format("there are {} names, but {} positions", axes.size(),
-                                request.positions.size()));
-    }
-    return moveOf(request.names, ask(*shell_, MoveLine{axes, request.positions, request.relative,
-                                                       request.velocity, request.duration}));
+    MoveLine line = lineOf(request.names, request.positions);
+    line.relative = request.relative;
+    line.velocity = request.velocity;
+    line.duration = request.duration;
+    return moveOf(request.names, ask(*shell_, std::move(line)));
   }
 
   static std::vector<std::string> refusalsOf(const activity::Reply& reply) {
@@ -545,6 +642,8 @@ class Machine::Impl {
   // Destroyed in this order: axes, shell, controller, engine, recorder, port, lines.
   Disposer disposer_;
   const std::vector<config::OutputConfig> outputs_;
+  const std::vector<config::InputConfig> inputs_;
+  std::atomic<std::uint64_t> latches_{0};
   std::mutex io_mutex_;  // guards on_io_
   std::function<void(const IoStates&)> on_io_;
   std::shared_ptr<gpio::Lines> lines_;
@@ -728,6 +827,33 @@ void Machine::clearPositionCompare(const std::string& output) {
 void Machine::setOutput(const std::string& name, bool on) {
   ask(*impl_->shell_, SetOutput{name, on});
 }
+
+ProbeResult Machine::probe(const ProbeRequest& request, const std::function<bool()>& cancelled) {
+  refuseBadProbing(request);
+  return impl_->probe(*this, request, cancelled);
+}
+
+Latch Machine::latch(const LatchRequest& request) {
+  BeginLatch begin = impl_->latchOf(request);
+  const Latch latch{begin.id, begin.record};
+  ask(*impl_->shell_, std::move(begin));
+  return latch;
+}
+
+LatchResult Machine::wait(const Latch& latch, const std::function<bool()>& cancelled) {
+  bool ending = false;
+  const auto over_or_cancelled = [&] {
+    return latch.record->result() || (!ending && cancelled && cancelled());
+  };
+  impl_->shell_->wait(over_or_cancelled, static_cast<bool>(cancelled));
+  if (!latch.record->result()) {
+    ending = true;
+    end(latch);
+  }
+  return *latch.record->result();
+}
+
+void Machine::end(const Latch& latch) { ask(*impl_->shell_, EndLatch{latch.id}); }
 
 IoStates Machine::ioStates() const { return *impl_->shell_->snapshot()->io; }
 

@@ -24,10 +24,14 @@ void NamedInput::poll(const activity::Context& context) {
   input_.poll(context);
   state_.active = input_.active();
   state_.changed = input_.changed();
-  state_.error = input_.error() != 0 ? fmt::format("the line {} of the input {} can't be read: {}",
-                                                   context.lines.input(input_.line()), state_.name,
-                                                   gpio::errorText(input_.error()))
-                                     : "";
+  state_.error = failureNow(context);
+}
+
+std::string NamedInput::failureNow(const activity::Context& context) const {
+  const int level = context.levels.level(input_.line());
+  if (level >= 0) return "";
+  return fmt::format("the line {} of the input {} can't be read: {}",
+                     context.lines.input(input_.line()), state_.name, gpio::errorText(-level));
 }
 
 // ---- all ----

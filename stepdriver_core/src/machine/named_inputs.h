@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "activity/context.h"
 #include "activity/debounced_input.h"
+#include "activity/input_edges.h"
 #include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/machine/io_states.h"
 
@@ -24,6 +27,17 @@ class NamedInput {
   void poll(const activity::Context& context);
   /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const { return input_.due(); }
+  /// Whether its last reading was active.
+  bool isActiveNow(const activity::Context& context) const {
+    const int level = context.levels.level(input_.line());
+    return level >= 0 && (level != 0) == input_.activeLevel();
+  }
+  /// Why its last reading has failed; empty: it hasn't.
+  std::string failureNow(const activity::Context& context) const;
+  /// Its edges, for somebody else who watches it.
+  activity::InputEdges edges() const {
+    return {input_.line(), input_.activeLevel(), input_.debounce()};
+  }
   /// Whether its level must be read until it has stayed.
   bool isBouncing() const { return input_.bouncesSince().has_value(); }
 
@@ -42,6 +56,15 @@ class NamedInputs {
   void begin(const activity::Context& context);
   void poll(const activity::Context& context);
   pulse::Nanoseconds due() const;
+  /// Whether the last reading of an input was active, by its number in the configuration.
+  bool isActiveNow(const activity::Context& context, std::size_t input) const {
+    return inputs_.at(input).isActiveNow(context);
+  }
+  std::string failureNow(const activity::Context& context, std::size_t input) const {
+    return inputs_.at(input).failureNow(context);
+  }
+  /// The edges of an input, by its number in the configuration.
+  activity::InputEdges edgesOf(std::size_t input) const { return inputs_.at(input).edges(); }
   /// Whether one of them waits for its level.
   bool areWatched() const;
   std::vector<InputState> states() const;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 #include "support/bench.h"
 #include "support/constants.h"

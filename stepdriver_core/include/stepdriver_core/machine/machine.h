@@ -15,6 +15,8 @@
 #include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/machine/io_states.h"
+#include "stepdriver_core/machine/latch.h"
+#include "stepdriver_core/machine/probe.h"
 #include "stepdriver_core/machine/recording.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -347,6 +349,25 @@ class Machine {
   /// No position switches it any more: it goes off. @throw Refused if there is no such output.
   void clearPositionCompare(const std::string& output);
 
+  /// Latches the positions of axes at edges of an input with a name, each at the edge's kernel time
+  /// stamp, while they move or rest. Nothing that happens to the axes ends it.
+  ///
+  /// @throw Refused if there is no such input or axis, or if the window is empty.
+  Latch latch(const LatchRequest& request);
+  /// Returns when it has ended: after its first edge, by end(), or with the machine.
+  ///
+  /// @param cancelled asked often while this waits; if it returns true, the latch ends.
+  LatchResult wait(const Latch& latch, const std::function<bool()>& cancelled = {});
+  /// Ends it. Does nothing if it has ended.
+  void end(const Latch& latch);
+  /// Moves axes along a straight line until an input tells of a contact: they come to rest then, at
+  /// the deceleration of stops, and the result has the place of the contact, by the edge's time
+  /// stamp. Never beyond the requested positions. What ends a line ends this. Returns at the end.
+  ///
+  /// @param cancelled asked often while this waits; if it returns true, the axes come to rest.
+  /// @throw Refused as latch() and moveLine(), and if the input tells of a contact at the start;
+  ///   then nothing moves. A later refusal is a failure in the result.
+  ProbeResult probe(const ProbeRequest& request, const std::function<bool()>& cancelled = {});
   /// The outputs and inputs with a name.
   IoStates ioStates() const;
 

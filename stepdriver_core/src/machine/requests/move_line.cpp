@@ -51,7 +51,8 @@ std::string MoveLine::text(const AxisWords& words) const {
   return text;
 }
 
-void MoveLine::serve(RequestContext& machine, const SharedCall& call) const {
+std::shared_ptr<const axis::Outcome<axis::MoveResult>> MoveLine::begin(
+    RequestContext& machine, const SharedCall& call) const {
   const axis::AxisModel& first = machine.axis(axes.front());
   refuseBadNumber(first, "velocity", velocity);
   refuseBadNumber(first, "duration", duration);
@@ -68,12 +69,18 @@ void MoveLine::serve(RequestContext& machine, const SharedCall& call) const {
     axis::AxisModel& moved = machine.axis(axes[i]);
     activity::Goal goal;
     goal.kind = activity::Goal::Kind::kTogether;
-    setTarget(goal, machine, moved, positions[i], relative);
+    if (continues) {
+      setPlace(goal, machine, moved, positions[i]);
+    } else {
+      setTarget(goal, machine, moved, positions[i], relative);
+    }
     orders.push_back({&moved, machine.withOutcome(goal)});
   }
+  const auto outcome = orders.front().goal.outcome;
   machine.activities.begin(std::make_unique<activity::FollowLine>(
                                machine.context, std::move(orders), velocity, duration, call),
                            {axis::MoveEnd::kStopped, "a line was to begin"});
+  return outcome;
 }
 
 }  // namespace stepdriver::machine

@@ -4,10 +4,12 @@
 #include <variant>
 
 #include "await_rest.h"
+#include "begin_latch.h"
 #include "bring_up.h"
 #include "cancel_homing.h"
 #include "close.h"
 #include "enable.h"
+#include "end_latch.h"
 #include "extend_path.h"
 #include "follow_setpoints.h"
 #include "follow_trajectory.h"
@@ -21,6 +23,7 @@
 #include "note_position.h"
 #include "plan_move.h"
 #include "power_down.h"
+#include "probe_stroke.h"
 #include "recover.h"
 #include "reset.h"
 #include "restore_position.h"
@@ -45,8 +48,9 @@ using Request =
     std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine,
                  FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll, Hold, Resume,
                  SetSpeedOverride, SetLimits, SetCurrent, Home, CancelHoming, Enable, Sleep, Reset,
-                 SetMicrosteps, SetPosition, Recover, SetOutput, SetPositionCompare, BringUp,
-                 RestorePosition, NotePosition, Close, AwaitRest, PowerDown>;
+                 SetMicrosteps, SetPosition, Recover, SetOutput, SetPositionCompare, BeginLatch,
+                 EndLatch, ProbeStroke, BringUp, RestorePosition, NotePosition, Close, AwaitRest,
+                 PowerDown>;
 
 /// Whether it may be refused because of the level of a switch: the inputs are read when it is made.
 inline bool readsInputs(const Request& request) {

@@ -13,6 +13,7 @@
 #include "channel/channel_config.h"
 #include "driver/tmc_registers.h"
 #include "machine/named_lines.h"
+#include "machine/position_latches.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::machine {
@@ -56,6 +57,7 @@ class RequestContext {
   activity::Activities& activities;
   const std::optional<pulse::Signal> emergency_stop;  ///< the machine's input
   NamedLines named;
+  PositionLatches latches;
   std::vector<SharedCall> awaiting_rest;  ///< answered when every axis is at rest
 
   /// Currents that are being written to a driver chip.

@@ -24,18 +24,32 @@ double relativeOrigin(const RequestContext& machine, const axis::AxisModel& axis
   return static_cast<double>(*goal->target) + goal->remainder;
 }
 
+void setCount(activity::Goal& goal, double count) {
+  goal.target = motion::restingCount(count);
+  goal.remainder = count - static_cast<double>(*goal.target);
+}
+
 }  // namespace
 
 void setTarget(activity::Goal& goal, const RequestContext& machine, const axis::AxisModel& axis,
                double position, bool relative) {
   machine.refuseUnlessReadyToMove(axis);
-  if (!relative) axis.refuseUnlessHomed();
+  if (!relative) {
+    axis.refuseUnlessHomed();
+    return setPlace(goal, machine, axis, position);
+  }
   axis.refuseUnlessFinite("position", position);
-  const double count = relative ? relativeOrigin(machine, axis) + position * axis.stepsPerUnit()
-                                : axis.countOf(position);
-  axis.refuseBeyondLimits(relative ? axis.positionOf(count) : position, "the position");
-  goal.target = motion::restingCount(count);
-  goal.remainder = count - static_cast<double>(*goal.target);
+  const double count = relativeOrigin(machine, axis) + position * axis.stepsPerUnit();
+  axis.refuseBeyondLimits(axis.positionOf(count), "the position");
+  setCount(goal, count);
+}
+
+void setPlace(activity::Goal& goal, const RequestContext& machine, const axis::AxisModel& axis,
+              double position) {
+  machine.refuseUnlessReadyToMove(axis);
+  axis.refuseUnlessFinite("position", position);
+  axis.refuseBeyondLimits(position, "the position");
+  setCount(goal, axis.countOf(position));
 }
 
 }  // namespace stepdriver::machine

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "activity/context.h"
+#include "activity/debounced_input.h"
+#include "stepdriver_core/pulse/clock.h"
+
+namespace stepdriver::activity {
+
+/// The edges of an input, one after the other. With a debounce time an edge counts if the level
+/// stays, and its time is that of the first contact; without one, each edge that is reported
+/// counts, however short the pulse.
+class InputEdges {
+ public:
+  struct Edge {
+    bool active = false;
+    pulse::Nanoseconds time = 0;  ///< clock time
+  };
+
+  InputEdges(int line, bool active_level, pulse::Nanoseconds debounce)
+      : input_(line, active_level, debounce), active_level_(active_level) {}
+
+  /// Edges count from now on.
+  void begin(const Context& context);
+  /// @return the edges since the last call.
+  std::vector<Edge> poll(const Context& context);
+  /// The level now, after bouncing.
+  bool active() const { return input_.active(); }
+  int error() const { return input_.error(); }
+  int line() const { return input_.line(); }
+  /// Clock time by which poll() must be called.
+  pulse::Nanoseconds due() const;
+
+ private:
+  void add(bool level, pulse::Nanoseconds time, std::vector<Edge>& edges);
+
+  DebouncedInput input_;
+  bool active_level_;
+  bool level_ = false;            // after the last edge
+  pulse::Nanoseconds since_ = 0;  // the last edge, or begin()
+  // Without a debounce time: since when another level is read, of which no edge was reported.
+  std::optional<pulse::Nanoseconds> differs_;
+};
+
+}  // namespace stepdriver::activity

@@ -1,0 +1,322 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "stepdriver_core/error.h"
+#include "stepdriver_core/machine/machine.h"
+#include "support/bench.h"
+#include "support/passing_lines.h"
+#include "support/refusal.h"
+
+// Probing on the rig: 80 steps/mm; the probe of x is pressed from 20 mm on.
+
+namespace stepdriver {
+namespace {
+
+using machine::ProbeEnd;
+using machine::ProbeRequest;
+using machine::ProbeResult;
+using test::Bench;
+using test::kStep;
+using test::linearAxis;
+
+/// The line of the probe can be made unreadable.
+class BreakableLines : public test::PassingLines {
+ public:
+  using PassingLines::PassingLines;
+  int read(int input) noexcept override {
+    return broken && inputName(input) == "io.probe" ? -EIO : PassingLines::read(input);
+  }
+  bool broken = false;
+};
+
+class BreakableBackend : public gpio::Backend {
+ public:
+  explicit BreakableBackend(gpio::Backend& backend) : backend_(backend) {}
+  std::unique_ptr<gpio::Lines> request(const std::vector<gpio::OutputRequest>& outputs,
+                                       const std::vector<gpio::InputRequest>& inputs) override {
+    auto breakable = std::make_unique<BreakableLines>(backend_.request(outputs, inputs));
+    lines = breakable.get();
+    return breakable;
+  }
+  BreakableLines* lines = nullptr;
+
+ private:
+  gpio::Backend& backend_;
+};
+
+class ProbeTest : public testing::Test {
+ protected:
+  void SetUp() override { build(20.0); }
+
+  void build(double contact, double start = 0.0, int bounces = 0, bool must_home = false) {
+    std::vector<config::AxisConfig> axes{linearAxis("x"), linearAxis("y")};
+    if (must_home) {
+      axes[0].homing.emplace().kind = config::HomingKind::kDirect;
+      axes[0].require_homing = true;
+    }
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
+    sim::SwitchSpec probe;
+    probe.line = "io.probe";
+    probe.active_level = true;
+    probe.position = contact;
+    probe.end = contact + 60.0;
+    probe.bounces = bounces;
+    probe.bounce_ns = 100'000;
+    specs[0].flags.push_back(probe);
+    specs[0].start = start;
+    machine::MachineOptions options;
+    config::InputConfig input;
+    input.name = "probe";
+    input.line = {"io.probe", true, Bias::kAsIs};
+    input.debounce_ns = bounces > 0 ? 2'000'000 : 0;
+    options.inputs.push_back(input);
+    bench = std::make_unique<Bench>(axes, specs, false, 0.0, options);
+    if (must_home) return;
+    for (const auto& axis : bench->machine->axes()) axis->setPosition(0.0);
+  }
+
+  static ProbeRequest towards(double x) {
+    ProbeRequest request;
+    request.input = "probe";
+    request.names = {"x"};
+    request.positions = {x};
+    request.velocity = 0.02;
+    return request;
+  }
+
+  ProbeResult probe(const ProbeRequest& request, const std::function<bool()>& cancelled = {}) {
+    return bench->machine->probe(request, cancelled);
+  }
+
+  std::unique_ptr<Bench> bench;
+};
+
+TEST_F(ProbeTest, ComesToRestAfterTheContactAndKnowsItsPlace) {
+  const ProbeResult result = probe(towards(0.05));
+  EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+  EXPECT_TRUE(result.succeeded);
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
+  EXPECT_GT(result.positions.at(0), 0.02);
+  // 0.02 m/s at 1 m/s^2 are 0.2 mm.
+  EXPECT_LT(result.positions.at(0), 0.0204);
+  EXPECT_FALSE(bench->axis().state().moving);
+}
+
+TEST_F(ProbeTest, TouchesASecondTimeAndGoesBackToTheContact) {
+  ProbeRequest request = towards(0.05);
+  request.second_velocity = 0.002;
+  request.back_off = 0.003;
+  request.returns = true;
+  const ProbeResult result = probe(request);
+  EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
+  EXPECT_NEAR(bench->axis().state().position, result.contact.at(0), 0.51 * kStep);
+}
+
+TEST_F(ProbeTest, AThousandContactsAreWithinHalfAStepOfTheRigsPlace) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> places(1.0, 45.0);
+  std::uniform_real_distribution<double> speeds(0.001, 0.1);
+  double worst = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    const double place = places(random);
+    build(place, 0.0, i % 3 == 0 ? 5 : 0);
+    ProbeRequest request = towards(0.05);
+    request.velocity = speeds(random);
+    const ProbeResult result = probe(request);
+    ASSERT_EQ(result.end, ProbeEnd::kContact) << result.message;
+    // It is pressed by the first step at or beyond its place.
+    const double step = std::ceil(place * 80.0 - 1e-6) / 80'000.0;
+    worst = std::max(worst, std::abs(result.contact.at(0) - (step - 0.5 * kStep)));
+  }
+  EXPECT_LE(worst, 0.5 * kStep);
+}
+
+TEST_F(ProbeTest, AlongALineOfSeveralAxesTellsAllOfThem) {
+  ProbeRequest request = towards(0.04);
+  request.names = {"x", "y"};
+  request.positions = {0.04, -0.02};
+  const ProbeResult result = probe(request);
+  ASSERT_EQ(result.contact.size(), 2U) << result.message;
+  EXPECT_NEAR(result.contact[1], -0.5 * result.contact[0], 0.51 * kStep);
+  EXPECT_NEAR(result.positions[1], -0.5 * result.positions[0], 1.01 * kStep);
+}
+
+TEST_F(ProbeTest, AwayFromAContactTakesTheEdgeAtWhichItEnds) {
+  build(-40.0, 0.0);  // pressed until 20 mm
+  ProbeRequest request = towards(0.05);
+  request.away = true;
+  const ProbeResult result = probe(request);
+  EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+  EXPECT_NEAR(result.contact.at(0), 0.02 + 0.5 * kStep, 1e-8);
+}
+
+TEST_F(ProbeTest, WithoutAContactItFailsOrNotAsAsked) {
+  ProbeRequest request = towards(0.01);
+  ProbeResult result = probe(request);
+  EXPECT_EQ(result.end, ProbeEnd::kNoContact);
+  EXPECT_FALSE(result.succeeded);
+  EXPECT_NEAR(result.positions.at(0), 0.01, 1e-9);
+  EXPECT_TRUE(result.contact.empty());
+  request.positions = {0.0};
+  request.must = false;
+  result = probe(request);
+  EXPECT_EQ(result.end, ProbeEnd::kNoContact);
+  EXPECT_TRUE(result.succeeded);
+}
+
+TEST_F(ProbeTest, IsRefusedIfTheContactIsThereAtTheStart) {
+  build(-1.0);
+  EXPECT_REFUSED(probe(towards(0.05)), "the input probe is active already");
+  ProbeRequest request = towards(0.05);
+  request.second_velocity = 0.001;
+  EXPECT_REFUSED(probe(request), "back_off above 0");
+  EXPECT_EQ(bench->pulses(), 0);
+}
+
+TEST_F(ProbeTest, EndsWithWhateverEndsALine) {
+  const std::vector<std::function<void()>> ends{
+      [this] { bench->axis().stop(); }, [this] { bench->axis().enable(false); },
+      [this] { bench->machine->emergencyStop(); }, [this] { bench->axis().moveTo(-0.01); }};
+  for (const auto& end : ends) {
+    build(20.0);
+    bool done = false;
+    const ProbeResult result = probe(towards(0.05), [&] {
+      if (!done && bench->axis().state().position > 0.005) {
+        done = true;
+        end();
+      }
+      return false;
+    });
+    EXPECT_TRUE(done);
+    EXPECT_EQ(result.end, ProbeEnd::kFailed) << result.message;
+    EXPECT_FALSE(result.succeeded);
+  }
+  // The move that took over isn't stopped by a contact.
+  bench->machine->advance(1.0);
+  EXPECT_NEAR(bench->axis().state().position, -0.01, 1e-9);
+}
+
+TEST_F(ProbeTest, AHoldOnlyPutsOffTheContact) {
+  bool held = false;
+  const ProbeResult result = probe(towards(0.05), [&] {
+    if (!held && bench->axis().state().position > 0.005) {
+      held = true;
+      bench->machine->hold();
+      bench->machine->advance(0.5);
+      bench->machine->resume();
+    }
+    return false;
+  });
+  EXPECT_TRUE(held);
+  EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
+}
+
+TEST_F(ProbeTest, DeceleratesWhenItIsCancelled) {
+  const ProbeResult result =
+      probe(towards(0.05), [&] { return bench->axis().state().position > 0.005; });
+  EXPECT_EQ(result.end, ProbeEnd::kCancelled);
+  EXPECT_LT(result.positions.at(0), 0.006);
+}
+
+// The contact is known then, but the axis doesn't stand there.
+TEST_F(ProbeTest, IsCancelledOnTheWayBack) {
+  ProbeRequest request = towards(0.05);
+  request.velocity = 0.1;
+  request.returns = true;
+  const ProbeResult result = probe(request, [&] { return bench->axis().state().velocity < 0.0; });
+  EXPECT_EQ(result.end, ProbeEnd::kCancelled) << result.message;
+  EXPECT_FALSE(result.succeeded);
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
+  EXPECT_GT(result.positions.at(0), 0.021);
+}
+
+// Whoever stops the axis must find it at rest, and not see it leave for the next stroke.
+TEST_F(ProbeTest, AStopWhileItComesToRestEndsItWithoutAnotherStroke) {
+  ProbeRequest request = towards(0.05);
+  request.second_velocity = 0.002;
+  request.back_off = 0.003;
+  bool done = false;
+  const ProbeResult result = probe(request, [&] {
+    if (!done && bench->axis().state().position > 0.02) {
+      done = true;
+      bench->axis().stop();
+    }
+    return false;
+  });
+  EXPECT_TRUE(done);
+  EXPECT_EQ(result.end, ProbeEnd::kFailed);
+  EXPECT_EQ(result.message, "x: it was stopped");
+  EXPECT_GT(bench->axis().state().position, 0.02);
+}
+
+TEST_F(ProbeTest, WorksBeforeTheAxisIsHomedIfItsWayIsRelative) {
+  build(20.0, 0.0, 0, true);
+  ProbeRequest request = towards(0.05);
+  EXPECT_REFUSED(probe(request), "home");
+  request.relative = true;
+  request.second_velocity = 0.002;
+  request.back_off = 0.003;
+  request.returns = true;
+  const ProbeResult result = probe(request);
+  EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
+}
+
+TEST_F(ProbeTest, IsRefusedIfAnAxisMovesOrTheNumbersAreWrong) {
+  ProbeRequest request = towards(0.05);
+  request.second_velocity = std::nan("");
+  EXPECT_REFUSED(probe(request), "the second_velocity of the probing is nan");
+  request.second_velocity = 0.0;
+  request.back_off = -1.0;
+  EXPECT_REFUSED(probe(request), "the back_off of the probing is -1");
+  request.positions.push_back(0.0);
+  request.back_off = 0.0;
+  EXPECT_REFUSED(probe(request), "there are 1 names, but 2 positions");
+  EXPECT_EQ(bench->pulses(), 0);
+  bench->axis().moveTo(0.01);
+  EXPECT_REFUSED(probe(towards(0.05)), "it moves; a probing begins at rest");
+}
+
+TEST(UnreadableProbe, MovesNothingAndEndsAMotion) {
+  const std::vector<config::AxisConfig> axes{linearAxis("x")};
+  machine::MachineOptions options;
+  config::InputConfig input;
+  input.name = "probe";
+  input.line = {"io.probe", true, Bias::kAsIs};
+  options.inputs.push_back(input);
+  sim::Rig rig(Bench::rigAxes(axes), nullptr, {}, {}, Bench::ioOf(options));
+  pulse::VirtualClock clock;
+  gpio::SimulatedBackend simulated(rig, [&clock] { return clock.now(); });
+  BreakableBackend backend(simulated);
+  test::UnthreadedMachine machine(axes, backend, clock, options);
+  machine.axis("x").setPosition(0.0);
+  ProbeRequest request;
+  request.input = "probe";
+  request.names = {"x"};
+  request.positions = {0.05};
+  request.velocity = 0.02;
+  const ProbeResult result = machine.probe(request, [&] {
+    backend.lines->broken = machine.axis("x").state().position > 0.005;
+    return false;
+  });
+  EXPECT_EQ(result.end, ProbeEnd::kFailed);
+  EXPECT_NE(result.message.find("the input probe can't be read: EIO, input/output error"),
+            std::string::npos)
+      << result.message;
+  EXPECT_LT(result.positions.at(0), 0.01);
+  EXPECT_REFUSED(machine.probe(request),
+                 "the line io.probe of the input probe can't be read: EIO, input/output error");
+}
+
+}  // namespace
+}  // namespace stepdriver
