@@ -159,6 +159,34 @@ motion::MotionLimits limitsAt(const axis::AxisModel& axis, const motor::Motion& 
   return limits;
 }
 
+// How far a motion leads in a direction [microsteps].
+double reachOf(const motion::Profile& profile, double direction) {
+  const motion::PositionRange extent = motion::positionRangeOf(profile);
+  return direction > 0.0 ? extent.highest : -extent.lowest;
+}
+
+// The axis still moves away from where a goal leads it. Setpoints may be passed.
+bool turnsBack(const Goal& goal, const motion::MotionState& from, const motion::Profile& profile) {
+  const double way = (profile.endPosition() - from.position).value();
+  return goal.kind != Goal::Kind::kSetpoint && way * from.velocity < 0.0;
+}
+
+// It comes to rest within one set of limits, and then moves to its goal within another.
+motion::Plan planAfterStop(const axis::AxisModel& axis, const Goal& goal,
+                           const motion::MotionState& from, std::int64_t at,
+                           const motion::MotionLimits& stopping,
+                           const motion::MotionLimits& within) {
+  const motion::Profile stop = motion::planStop(at, from, stopping);
+  motion::MotionState rest;
+  rest.position = stop.endPosition();
+  motion::Plan plan = planFrom(axis, goal, rest, stop.endNs(), within);
+  std::vector<motion::Piece> pieces;
+  for (const motion::Piece& piece : stop.pieces()) pieces.push_back(piece);
+  for (const motion::Piece& piece : plan.profile.pieces()) pieces.push_back(piece);
+  if (!pieces.empty()) plan.profile = motion::Profile(at, std::move(pieces));
+  return plan;
+}
+
 bool areTheSame(const motion::MotionLimits& one, const motion::MotionLimits& other) {
   return one.acceleration == other.acceleration && one.deceleration == other.deceleration &&
          one.jerk == other.jerk;
@@ -189,10 +217,16 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t no
   const auto best_within = [&]() -> GoalPlan {
     if (areTheSame(before, within)) return plan_within(within);
     const motion::AccelerationRampDown ramp_down(at, from, within, before.jerk);
-    GoalPlan changed{ofJoint(axis, goal, now,
-                             ramp_down.followedBy(
-                                 planFrom(axis, goal, ramp_down.end(), ramp_down.endNs(), within))),
-                     ramp_down.isNeeded() ? before : within, slows_ns};
+    GoalPlan changed{
+        ramp_down.followedBy(planFrom(axis, goal, ramp_down.end(), ramp_down.endNs(), within)),
+        ramp_down.isNeeded() ? before : within, slows_ns};
+    if (turnsBack(goal, from, changed.plan.profile)) {
+      motion::Plan turned = planAfterStop(axis, goal, from, at, before, within);
+      if (reachOf(turned.profile, from.velocity) < reachOf(changed.plan.profile, from.velocity)) {
+        changed = {std::move(turned), before, slows_ns};
+      }
+    }
+    changed.plan = ofJoint(axis, goal, now, std::move(changed.plan));
     const double excess = excessOf(axis, goal, changed.plan);
     if (excess <= motion::kNoStep) return changed;
     GoalPlan kept = plan_within(before);

@@ -224,6 +224,38 @@ TEST_F(AxisLimitsTest, LetNoMotionPassASoftLimit) {
   }
 }
 
+// From 1 m/s it turns within 0.25 m, or 0.5 m with the jerk limit, and would take 5 m with the
+// lower deceleration.
+TEST_F(AxisLimitsTest, DoNotTakeAnAxisThatTurnsBackFarther) {
+  for (const double jerk : {0.0, 4.0}) {
+    for (const bool jogs : {false, true}) {
+      for (const double after : {0.0, 0.001, 0.1, 0.3, 0.45}) {
+        SCOPED_TRACE(testing::Message() << jerk << " m/s^3, after " << after);
+        build(jerk);
+        x().moveTo(10.0);
+        advance(3.0);
+        const double place = x().state().position;
+        if (jogs) {
+          x().jog(-1.0);
+        } else {
+          x().moveTo(0.0);
+        }
+        advance(after);
+        x().setLimits({0.0, 0.1, 0.1, 0.2});
+        double farthest = place;
+        for (int k = 0; k < 2000; ++k) {
+          advance(0.001);
+          farthest = std::max(farthest, x().state().position);
+        }
+        EXPECT_GT(farthest, place + 0.2);
+        EXPECT_LE(farthest, place + (jerk > 0.0 ? 0.5 : 0.25) + 0.003);
+        EXPECT_LT(velocity(), 0.0);
+        EXPECT_GT(velocity(), -0.2) << "from there on, the new ones apply";
+      }
+    }
+  }
+}
+
 /// A lower jerk takes an acceleration back more slowly: from 2 m/s^2 at 0.01 m/s^3 in 200 s, while
 /// the speed changes by 200 m/s.
 class LowerJerk : public AxisLimitsTest {

@@ -190,7 +190,8 @@ TEST(SlowPath, KeepsItsSpeedBetweenKnotsThatAreAsCloseAsTheyMayBe) {
   };
   for (const Case& made :
        {Case{0.0626, 24'340.0, 1e15, {{0.00341, 0.0}, {-1497.27, 546.282}, {-1494.92, 546.797}}},
-        Case{0.0, 16'280.0, 1e15, {{5.01928, 0.0}}}, Case{0.0, 60'000.0, 1e15, {{13.0325, 0.0}}}}) {
+        Case{0.0, 16'280.0, 1e15, {{5.01928, 0.0}}}, Case{0.0, 60'000.0, 1e15, {{13.0325, 0.0}}},
+        Case{0.0, 150'000.0, 1e15, {{100.0, 0.0}}}}) {
     SCOPED_TRACE(made.velocity);
     const std::vector<motion::PathAxis> axes = {pathAxis("x", {1.0, 1e6, 1e12, made.jerk}),
                                                 pathAxis("y", {1.0, 1e6, 1e12, made.jerk})};

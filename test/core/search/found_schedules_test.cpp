@@ -210,6 +210,16 @@ TEST(FoundSchedules, LowerLimitsDoNotTakeAnAxisWithABacklashPastItsTarget) {
   }
 }
 
+// The axis still braked for a move the other way, and went on with lower limits.
+TEST(FoundSchedules, LowerLimitsDoNotTakeAnAxisThatTurnsBackFarther) {
+  for (int variant = 0; variant < static_cast<int>(kVariants); ++variant) {
+    expectGood({variant,
+                {does(1, 4, "line of y and z by"), does(1, 16, "move y by 7 mm"),
+                 does(0, 0, "move y by 7 mm"), does(1, 4, "gentle limits of y")},
+                {{7, Who::kEngine, 40}}});
+  }
+}
+
 // The accelerations of the parts cancelled each other out but for rounding, and all steps of such a
 // stretch came at once.
 TEST(FoundSchedules, AnAxisThatIsShapedTwiceMakesNoBursts) {
