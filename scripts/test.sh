@@ -398,7 +398,7 @@ check_install() {
     die "stepdriver_joystick --help doesn't work"
   rosrun stepdriver stepdriver_base --help >"$build/log/base-help.log" ||
     die "stepdriver_base --help doesn't work"
-  for program in console draw measure_resonance panel plot_motion; do
+  for program in console draw measure_resonance panel plot_motion tune_stall; do
     rosrun stepdriver "$program" --help >"$build/log/$program-help.log" ||
       die "$program --help doesn't work"
   done

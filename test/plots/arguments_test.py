@@ -1,4 +1,4 @@
-"""The command lines of plot_motion, measure_resonance and draw."""
+"""The command lines of plot_motion, measure_resonance, tune_stall and draw."""
 
 import subprocess
 import sys
@@ -23,7 +23,14 @@ class ArgumentsTest(unittest.TestCase):
     def test_name_what_is_missing(self):
         self.assertIn("required: file", self.said("draw"))
         self.assertIn("required: --axis", self.said("measure_resonance"))
+        self.assertIn("required: --axis, --distance", self.said("tune_stall"))
         self.assertIn("required: --axis", self.said("plot_motion", "plan", "--out=plan.svg", "--to", "3"))
+
+    def test_name_what_is_out_of_range(self):
+        way = ["tune_stall", "--axis", "x", "--distance"]
+        self.assertIn("argument --distance: 0: must not be 0", self.said(*way, "0"))
+        for number in ("1", "1001", "2.5", "nan"):
+            self.assertIn(f"argument --homings: {number}: must be a", self.said(*way, "-8", "--homings", number))
 
 
 if __name__ == "__main__":

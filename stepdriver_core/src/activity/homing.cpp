@@ -77,6 +77,7 @@ void Homing::refuseUnlessReady(const axis::AxisModel& axis) {
 }
 
 void Homing::onBegin(std::vector<Predecessor> /*predecessors*/) {
+  was_homed_ = axis_.position.isHomed();
   axis_.position.beginHoming();
   deadline_ = context().now + nanoseconds(config_.timeout);
   waking_ = wakeSteps(context(), axis_);

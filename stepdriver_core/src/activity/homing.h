@@ -71,6 +71,8 @@ class Homing : public Activity {
   /// Begins a phase, whose strokes must end within max_travel. @param direction 1 or -1
   void enter(axis::HomingPhase phase, double direction);
   axis::HomingPhase phase() const { return phase_; }
+  /// The axis was homed when this homing began.
+  bool wasHomed() const { return was_homed_; }
   /// The joint's count at which the strokes of this phase must end.
   std::int64_t bound() const { return bound_; }
   /// Clock time.
@@ -110,6 +112,7 @@ class Homing : public Activity {
   std::unique_ptr<MotionExecution> stroke_;  // under way
   std::int64_t bound_ = 0;
   pulse::Nanoseconds phase_began_ = 0;
+  bool was_homed_ = false;
 };
 
 }  // namespace stepdriver::activity

@@ -117,6 +117,7 @@ class HomingToStall final : public Homing {
   void noteLoad(std::uint32_t load);
   void disarmed(int mscnt);
   void compare();
+  std::string shiftText() const;
   bool isApproach() const {
     return phase() == axis::HomingPhase::kSeeking || phase() == axis::HomingPhase::kLatching;
   }

@@ -167,7 +167,7 @@ void HomingToStall::strokeEnded() {
                                end == axis::MoveEnd::kEndstopMin ? "min" : "max", nameOf(phase())));
   }
   if (phase() == axis::HomingPhase::kPullingOff) {
-    return succeed(trigger_, 0.0, fmt::format(" at MSCNT {}", mscnt_));
+    return succeed(trigger_, 0.0, fmt::format(" at MSCNT {}", mscnt_) + shiftText());
   }
   const bool is_blocked = axis_.motor.state().end == pulse::EndReason::kBlocked;
   endStroke();
@@ -197,6 +197,12 @@ void HomingToStall::disarmed(int mscnt) {
     trigger_ += audit_.direction() * away * fullStep() / driver::tmc::kFinest;
   }
   compare();
+}
+
+std::string HomingToStall::shiftText() const {
+  if (!wasHomed()) return "";
+  const double shift = axis_.positionOf(trigger_) - config_.offset;
+  return fmt::format(", {} from where it was homed before", axis_.showPlace(shift));
 }
 
 // What stops one approach on the way, or keeps it from coming to its speed, doesn't stop the next.

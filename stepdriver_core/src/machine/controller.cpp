@@ -28,6 +28,10 @@ constexpr const char* kPowerRemedy =
 // chip takes a tenth of a second for its three tries, and up to four share a port.
 constexpr pulse::Nanoseconds kPollPeriod = 250'000'000;
 constexpr pulse::Nanoseconds kAuditPeriod = 1'000'000'000;
+// From a sample of the load in motion to the next one: 20 a second, or less on a slow wire, of
+// which a chip's samples take at most a quarter.
+constexpr pulse::Nanoseconds kSamplePeriod = 50'000'000;
+constexpr pulse::Nanoseconds kPauseAfterSample = 3;  // times as long as the sample took
 
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
@@ -129,7 +133,8 @@ pulse::Nanoseconds Controller::pollDue() const {
   pulse::Nanoseconds due = pulse::kNever;
   for (const auto& axis : context_.axes) {
     for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
-      if (const motor::TmcChip* chip = axis->motor.tmcAt(i)) due = std::min(due, pollDue(*chip));
+      const motor::TmcChip* chip = axis->motor.tmcAt(i);
+      if (chip != nullptr) due = std::min({due, pollDue(*chip), sampleDue(*axis, *chip)});
     }
   }
   return due;
@@ -342,10 +347,20 @@ void Controller::superviseIdle(axis::AxisModel& axis) {
 
 // ---- chips with a serial port ----
 
+bool Controller::answers(const motor::TmcChip& chip) const {
+  return chip.isSetUp() && context_.mode.powered && context_.mode.closed.empty();
+}
+
 pulse::Nanoseconds Controller::pollDue(const motor::TmcChip& chip) const {
-  const bool answers =
-      chip.isSetUp() && chip.polling == 0 && context_.mode.powered && context_.mode.closed.empty();
-  return answers ? chip.next_poll : pulse::kNever;
+  return answers(chip) && chip.polling == 0 ? chip.next_poll : pulse::kNever;
+}
+
+// A homing to a stall reads the load itself.
+pulse::Nanoseconds Controller::sampleDue(const axis::AxisModel& axis,
+                                         const motor::TmcChip& chip) const {
+  const bool samples = answers(chip) && chip.measuresLoad() && axis.moving() &&
+                       !chip.isPreparedForStall() && chip.sampling == 0;
+  return samples ? chip.next_sample : pulse::kNever;
 }
 
 void Controller::superviseChips(axis::AxisModel& axis) {
@@ -358,6 +373,7 @@ void Controller::superviseChips(axis::AxisModel& axis) {
     if (axis.fault) chip->audit().end();
     if (!rests) chip->resting_count.reset();
     endStall(axis, *chip);
+    sampleLoad(axis, *chip);
     if (context_.now < pollDue(*chip)) continue;
     const bool audits = rests && context_.now >= chip->next_audit;
     if (audits) chip->resting_count = axis.motor.countOf(i);
@@ -365,6 +381,25 @@ void Controller::superviseChips(axis::AxisModel& axis) {
     job.id = chip->polling = context_.newJob();
     context_.out->register_jobs.push_back(std::move(job));
   }
+}
+
+void Controller::sampleLoad(const axis::AxisModel& axis, motor::TmcChip& chip) {
+  if (context_.now < sampleDue(axis, chip)) return;
+  chip.sampled_since = context_.now;
+  bus::RegisterJob job = chip.sampleLoad();
+  job.id = chip.sampling = context_.newJob();
+  context_.out->register_jobs.push_back(std::move(job));
+}
+
+void Controller::takeSample(axis::AxisModel& axis, motor::TmcChip& chip,
+                            const bus::RegisterDone& done) {
+  const pulse::Nanoseconds took = context_.now - chip.sampled_since;
+  chip.next_sample = context_.now + std::max(kSamplePeriod, kPauseAfterSample * took);
+  const motion::MotionState planned = axis.motor.stateAt(context_.motionNow());
+  const auto slack = static_cast<double>(axis.motor.state().slack);
+  chip.takeSample(done, axis.positionOf(planned.position.value() - slack),
+                  planned.velocity / axis.stepsPerUnit());
+  axis.motor.noteChips();
 }
 
 // Whatever has ended a homing to a stall: its registers are for nothing else.
@@ -385,8 +420,10 @@ void Controller::on(const bus::RegisterDone& done) {
   for (const auto& axis : context_.axes) {
     for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
       motor::TmcChip* chip = axis->motor.tmcAt(i);
-      if (chip != nullptr && chip->polling == done.id) return takePoll(*axis, i, done);
-      if (chip == nullptr || chip->ending_stall != done.id) continue;
+      if (chip == nullptr) continue;
+      if (chip->polling == done.id) return takePoll(*axis, i, done);
+      if (chip->sampling == done.id) return takeSample(*axis, *chip, done);
+      if (chip->ending_stall != done.id) continue;
       const std::string why = chip->takeEndOfStall(done);
       axis->motor.noteChips();
       if (!why.empty()) failChip(*axis, i, why);

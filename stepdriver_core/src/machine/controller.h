@@ -74,8 +74,13 @@ class Controller {
   void takeCurrent(const RequestContext::CurrentChange& change, const bus::RegisterDone& done);
   void endStall(const axis::AxisModel& axis, motor::TmcChip& chip);
   void failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault);
+  bool answers(const motor::TmcChip& chip) const;
   /// When a chip is asked how it is; kNever: not, for now.
   pulse::Nanoseconds pollDue(const motor::TmcChip& chip) const;
+  /// The same for its load in motion.
+  pulse::Nanoseconds sampleDue(const axis::AxisModel& axis, const motor::TmcChip& chip) const;
+  void sampleLoad(const axis::AxisModel& axis, motor::TmcChip& chip);
+  void takeSample(axis::AxisModel& axis, motor::TmcChip& chip, const bus::RegisterDone& done);
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
   AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;
 

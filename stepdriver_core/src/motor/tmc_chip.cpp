@@ -112,18 +112,11 @@ bus::RegisterJob TmcChip::changeMode(int microsteps) const {
 
 // Reading clears the flags of a TMC2130: a second answer would be another one.
 bus::RegisterAccess TmcChip::readFlags() const {
-  bus::RegisterAccess access = read(tmc::kGstat);
-  if (settings_.model == tmc::Model::kTmc2130) access.kind = Kind::kSample;
-  return access;
+  return settings_.model == tmc::Model::kTmc2130 ? sample(tmc::kGstat) : read(tmc::kGstat);
 }
 
 bus::RegisterJob TmcChip::poll(bool audits) const {
   Accesses all{readFlags(), read(tmc::kDrvStatus, tmc::volatileStatusOf(settings_.model))};
-  if (settings_.model == tmc::Model::kTmc2209) {
-    bus::RegisterAccess load = read(tmc::kSgResult);
-    load.kind = Kind::kSample;
-    all.push_back(load);
-  }
   // No damaged answer hides or makes up a reset: a chip that has forgotten its mode isn't set up.
   if (tmc::isOnSpi(settings_.model)) all.push_back(read(tmc::kChopconf));
   if (audits) all.push_back(read(tmc::kMscnt));
@@ -161,10 +154,16 @@ bus::RegisterJob TmcChip::armStall(double speed) const {
   return jobOf({write(tmc::kTcoolthrs, tmc::thresholdOf(kSlowest * speed))});
 }
 
-bus::RegisterJob TmcChip::readLoad() const {
-  bus::RegisterAccess load = read(tmc::kSgResult);
-  load.kind = Kind::kSample;
-  return jobOf({load});
+bus::RegisterAccess TmcChip::sample(std::uint8_t number) const {
+  bus::RegisterAccess access = read(number);
+  access.kind = Kind::kSample;
+  return access;
+}
+
+bus::RegisterJob TmcChip::readLoad() const { return jobOf({sample(tmc::kSgResult)}); }
+
+bus::RegisterJob TmcChip::sampleLoad() const {
+  return jobOf({sample(tmc::kSgResult), sample(tmc::kDrvStatus)});
 }
 
 bus::RegisterJob TmcChip::disarmStall() const {
@@ -247,15 +246,23 @@ std::string TmcChip::takeMode(const bus::RegisterDone& done) {
 std::string TmcChip::takePoll(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
-  tmc::Status status = tmc::statusOf(settings_.model, done.values.at(1));
+  const tmc::Status status = tmc::statusOf(settings_.model, done.values.at(1));
   std::uint32_t flags = done.values.front();
-  if (settings_.model == tmc::Model::kTmc2209) {
-    status.stall_guard = static_cast<int>(done.values.at(2));
-  }
   if (tmc::isOnSpi(settings_.model) && done.values.at(2) != chopconf_) flags |= tmc::kGstatReset;
   takeStatus(status);
   mscnt_ = static_cast<int>(done.values.back());  // if it was asked for
   return faultOf(flags, status);
+}
+
+void TmcChip::takeSample(const bus::RegisterDone& done, double position, double velocity) {
+  sampling = 0;
+  count(done);
+  if (done.failure != bus::Failure::kNone) return;
+  const tmc::Status status = tmc::statusOf(settings_.model, done.values.back());
+  if (status.standstill || !status.stealth_chop.value_or(false)) return;
+  state_.stall_guard = static_cast<int>(done.values.front());
+  state_.stall_guard_position = position;
+  state_.stall_guard_velocity = velocity;
 }
 
 std::string TmcChip::takeCurrent(const tmc::CurrentScale& scale, const bus::RegisterDone& done) {
@@ -280,10 +287,10 @@ void TmcChip::takeStatus(const tmc::Status& status) {
   state_.open_load_a = status.open_load_a;
   state_.open_load_b = status.open_load_b;
   state_.at_least_celsius = status.at_least_celsius;
-  // It is measured in motion, and on SPI only in SpreadCycle. At rest it keeps its value.
-  const bool is_measured =
-      status.stall_guard && tmc::isOnSpi(settings_.model) != state_.stealth_chop;
-  if (is_measured && !status.standstill) state_.stall_guard = status.stall_guard;
+  // On SPI it is measured in SpreadCycle only. At rest it keeps its value.
+  if (status.stall_guard && !state_.stealth_chop && !status.standstill) {
+    state_.stall_guard = status.stall_guard;
+  }
 }
 
 std::string TmcChip::faultOf(std::uint32_t gstat, const tmc::Status& status) {

@@ -33,6 +33,10 @@ class TmcChip {
   bus::RegisterJob changeMode(int microsteps) const;
   /// What the chip says of itself. @param audits MSCNT, too.
   bus::RegisterJob poll(bool audits = false) const;
+  /// SG_RESULT can be read in motion, with sampleLoad().
+  bool measuresLoad() const { return settings_.model == driver::tmc::Model::kTmc2209; }
+  /// SG_RESULT, and how the chip chops. @pre measuresLoad()
+  bus::RegisterJob sampleLoad() const;
   /// The scale of currents [A rms] in the range that is configured.
   driver::tmc::CurrentScale scaleOf(double run, double hold) const;
   /// [A rms] The lowest current in that range.
@@ -69,6 +73,9 @@ class TmcChip {
   /// Takes the answers to poll(). @return a fault, without the name of the chip; empty if there is
   ///   none.
   std::string takePoll(const bus::RegisterDone& done);
+  /// Takes the answers to sampleLoad(), when the axis had this position [unit] and velocity
+  /// [unit/s]. If there is none, the next poll says why.
+  void takeSample(const bus::RegisterDone& done, double position, double velocity);
   /// Takes the answer to setCurrent(), which also counts for a later setUp(). @return why the
   ///   currents aren't changed; empty if they are.
   std::string takeCurrent(const driver::tmc::CurrentScale& scale, const bus::RegisterDone& done);
@@ -103,12 +110,20 @@ class TmcChip {
   pulse::Nanoseconds next_audit = 0;
   /// @}
 
+  /// @name The sample of its load under way, the same way
+  /// @{
+  std::uint64_t sampling = 0;  ///< its job; 0: none
+  pulse::Nanoseconds sampled_since = 0;
+  pulse::Nanoseconds next_sample = 0;
+  /// @}
+
  private:
   using Accesses = std::vector<bus::RegisterAccess>;
 
   bus::RegisterJob jobOf(Accesses accesses) const;
   bus::RegisterAccess write(std::uint8_t number, std::uint32_t value) const;
   bus::RegisterAccess read(std::uint8_t number, std::uint32_t volatile_bits = 0) const;
+  bus::RegisterAccess sample(std::uint8_t number) const;
   void count(const bus::RegisterDone& done);
   std::string failureText(const bus::RegisterDone& done);
   void takeStatus(const driver::tmc::Status& status);

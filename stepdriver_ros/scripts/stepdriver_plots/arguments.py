@@ -61,6 +61,23 @@ def not_negative(text):
     return value
 
 
+def not_zero(text):
+    value = number(text)
+    if value == 0.0:
+        raise argparse.ArgumentTypeError(f"{text}: must not be 0")
+    return value
+
+
+def whole(least, most):
+    """A type of whole numbers in a range."""
+    def read(text):
+        value = number(text)
+        if value != int(value) or not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text}: must be a whole number from {least} to {most}")
+        return int(value)
+    return read
+
+
 def damping_ratio(text):
     value = not_negative(text)
     if value > 0.9:

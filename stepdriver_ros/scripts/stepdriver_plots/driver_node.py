@@ -39,6 +39,11 @@ class DriverNode:
             raise NodeError(f"{self.name} refuses: {answer.message}")
         return answer
 
+    def place_of(self, axis):
+        """The answer of the service plan for a move to where an axis is: its position and its scale."""
+        from stepdriver.srv import Plan
+        return self.call(f"{axis}/plan", Plan, relative=True, position=0.0)
+
     def follow_path(self, tell, **fields):
         """Follows a path until its end. tell: is called with the covered part, 0 to 1, from time to time.
         Returns the positions at its end. Raises NodeError if the path is refused, or if something else
@@ -193,3 +198,36 @@ class Accelerometer:
         self._samples = [sample for sample in samples if sample[0] > end]
         wanted = [sample for sample in samples if begin <= sample[0] <= end]
         return [time for time, _ in wanted], [value for _, value in wanted]
+
+
+class LoadOfDriver:
+    """What the driver chips of an axis measure of their load in a motion."""
+
+    def __init__(self, topic):
+        from stepdriver.msg import DriverState
+        self._samples = []
+        self._last = None
+        self._newest = None
+        self._subscriber = rospy.Subscriber(topic, DriverState, self._take, queue_size=100)
+        latest = time.monotonic() + CONNECT
+        while self._newest is None:
+            if time.monotonic() > latest:
+                raise NodeError(f"{topic}: no stepdriver/DriverState has come in {CONNECT:g} s")
+            time.sleep(PAUSE)
+
+    def _take(self, message):
+        self._newest = message
+        measured = [values for values in zip(message.sg_position, message.sg_velocity, message.sg_result)
+                    if values[2] >= 0]
+        if not measured or measured == self._last:  # the chip was asked for something else
+            return
+        self._last = measured
+        self._samples.append(min(measured, key=lambda values: values[2]))  # the motor with the highest load
+
+    def begin(self):
+        """Forgets all samples."""
+        self._samples = []
+
+    def end(self):
+        """Positions, velocities and values of SG_RESULT since begin()."""
+        return list(self._samples)

@@ -116,6 +116,20 @@ def draw_spectrum(frequencies, responses, shapers, path, axis):
     save(figure, path)
 
 
+def draw_loads(ways, stall, path, axis, unit):
+    """What a driver chip has measured of its load. ways: (name, positions, values of SG_RESULT). stall: the
+    value from which on it is a stall."""
+    figure, panel = plt.subplots(figsize=(6.4, 3.2))
+    for (name, positions, loads), colour in zip(ways, COLOURS):
+        panel.plot(positions, loads, ".-", color=colour, label=name)
+    panel.axhline(stall, color="#222222", linewidth=0.8, linestyle="--", label="stall, as proposed")
+    panel.set_ylim(bottom=0.0)
+    panel.set_xlabel(f"position of {axis} [{unit}]")
+    panel.set_ylabel("SG_RESULT")
+    legend_above(panel)
+    save(figure, path)
+
+
 def draw_deflections(figure, row, deflections, unit):
     """In place of the panels of a row."""
     grid = row[0].get_gridspec()

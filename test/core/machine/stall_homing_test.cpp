@@ -96,6 +96,9 @@ TEST_P(StallHoming, EndsWhereTheMotorIsBlocked) {
   machine.bench.move(0.0);
   machine.bench.machine->advance(2.0);
   EXPECT_EQ(machine.x().state().fault, "");
+  const HomingResult again = machine.x().home();
+  EXPECT_TRUE(contains(again.message, " m from where it was homed before")) << again.message;
+  EXPECT_FALSE(contains(result.message, "before")) << result.message;
 }
 
 // A hundred of them, from everywhere, at loads of up to 40 % of the torque.

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -80,6 +81,32 @@ TEST(TmcDrivers, AreSetUpByThreadsToo) {
     EXPECT_EQ(bench.axis(name).state().fault, "");
     EXPECT_EQ(violationsOf(bench.report(name)), "");
   }
+}
+
+// Twenty times a second, with the place and the speed at which it was measured.
+TEST(TmcDrivers, MeasureTheirLoadInMotion) {
+  Bench bench({tmcAxis()});
+  axis::Axis& x = bench.axis();
+  x.setPosition(0.0);
+  const auto load = [&x] { return x.state().drivers->front(); };
+  x.moveTo(0.09);
+  std::vector<double> places;
+  while (x.state().moving) {
+    const driver::DriverState now = load();
+    if (now.stall_guard && (places.empty() || places.back() != now.stall_guard_position)) {
+      places.push_back(now.stall_guard_position);
+      EXPECT_NEAR(now.stall_guard_position, x.state().planned, 1e-3);
+      EXPECT_NEAR(now.stall_guard_velocity, x.state().velocity, 0.02);
+    }
+    bench.machine->advance(0.005);
+  }
+  // 0.09 m at 0.1 m/s, with ramps of 0.1 s.
+  EXPECT_GE(places.size(), 15U);
+  EXPECT_LE(places.size(), 22U);
+  EXPECT_TRUE(std::is_sorted(places.begin(), places.end()));
+  const std::uint64_t before = load().transactions;
+  bench.machine->advance(1.0);
+  EXPECT_LE(load().transactions, before + 20) << "not at rest";
 }
 
 // A clock that moves from event to event would otherwise never rest.

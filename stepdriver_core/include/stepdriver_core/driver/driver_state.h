@@ -26,13 +26,15 @@ struct DriverState {
   bool temperature_warning = false;  ///< it will soon switch itself off
   bool open_load_a = false;          ///< no current flows in coil A; true at speed or at rest too
   bool open_load_b = false;
-  /// SG_RESULT in the last motion: the lower, the higher the load. It depends on the speed and the
-  /// current, and means something only while the chip chops silently. Empty: the chip hasn't
-  /// measured it.
+  /// SG_RESULT in the last motion, in which a TMC2209 is asked for it twenty times a second: the
+  /// lower, the higher the load. It depends on the speed and the current, and means something only
+  /// while the chip chops silently. Empty: the chip hasn't measured it.
   std::optional<int> stall_guard;
-  int highest_stall_guard = 510;   ///< without a load
-  std::uint64_t transactions = 0;  ///< reads and writes of its registers that succeeded
-  std::uint64_t retries = 0;       ///< that were tried again
+  double stall_guard_position = 0.0;  ///< [unit] of the axis, as planned, when SG_RESULT was read
+  double stall_guard_velocity = 0.0;  ///< [unit/s] the same
+  int highest_stall_guard = 510;      ///< without a load
+  std::uint64_t transactions = 0;     ///< reads and writes of its registers that succeeded
+  std::uint64_t retries = 0;          ///< that were tried again
 };
 
 /// How much of its capacity the load takes, from 0 to 1, to be compared at the same speed and

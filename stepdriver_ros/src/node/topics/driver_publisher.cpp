@@ -32,6 +32,8 @@ void DriverPublisher::publish(const axis::AxisState& state, ros::Time stamp) {
     message.open_load_a.push_back(driver.open_load_a);
     message.open_load_b.push_back(driver.open_load_b);
     message.sg_result.push_back(driver.stall_guard.value_or(-1));
+    message.sg_position.push_back(driver.stall_guard_position);
+    message.sg_velocity.push_back(driver.stall_guard_velocity);
     message.load.push_back(driver::loadOf(driver).value_or(-1.0));
     message.accesses.push_back(driver.transactions);
     message.retries.push_back(driver.retries);
