@@ -23,10 +23,10 @@ namespace {
 constexpr double kMostRounding = 1.5e-4;
 // The same part if the axes would move by more than a microstep between such knots.
 constexpr double kMostRoundingOfFast = 5e-3;
-// After this many plans, the whole motion is slowed down if it still exceeds a limit. A motion that
-// begins at a speed can't be slowed down.
-constexpr int kMostPlans = 6;
-constexpr int kMostPlansFromSpeed = 12;
+// After this many plans, the whole motion is slowed down if it still exceeds a limit, or it isn't
+// possible if it begins at a speed. A plan changes few intervals after the first ones, and takes
+// little time.
+constexpr int kMostPlans = 24;
 // As a part of a limit: a smaller excess is left for slowing the whole motion down.
 constexpr double kSmallExcess = 1e-3;
 // Lowered limits change the neighbours too: lowering a few of them by a bit more, once most are
@@ -598,6 +598,12 @@ bool isLong(std::size_t interval, double part, double deviation, const PathGrid&
          middleDeviation(grid, interval, begin, end, knots.duration(interval)) > deviation;
 }
 
+void divide(const std::vector<bool>& which, PathGrid& grid, Reachability& speed, Knots& knots) {
+  const Division division = grid.divideEach(which, kPartsOfDivided);
+  speed.regrid(division);
+  knots.regrid(division);
+}
+
 // Divides the intervals that are too long, and those whose cubics are poor.
 bool divideLong(double deviation, PathGrid& grid, Reachability& speed, Knots& knots) {
   std::vector<bool> divided(grid.size(), false);
@@ -617,18 +623,16 @@ bool divideLong(double deviation, PathGrid& grid, Reachability& speed, Knots& kn
       knots.settle(i);
     }
   }
-  if (!any) return false;
-  const Division division = grid.divideEach(divided, kPartsOfDivided);
-  speed.regrid(division);
-  knots.regrid(division);
-  return true;
+  if (any) divide(divided, grid, speed, knots);
+  return any;
 }
 
 // Lowers the limits of the intervals of the cubics that exceed them, or has both ends of them
-// checked; returns the largest excess.
+// checked, and marks those as divided; returns the largest excess.
 Excess lowerLimits(double by_more, double poor, const PathGrid& grid, Reachability& speed,
-                   Knots& knots) {
+                   Knots& knots, std::vector<bool>& divided) {
   Excess worst;
+  divided.assign(grid.size(), false);
   for (std::size_t i = 1; i < knots.size(); ++i) {
     const CubicUsage usage = knots.usageBefore(i);
     const Excess excess{std::max(1.0, usage.acceleration()), std::max(1.0, usage.speed)};
@@ -641,6 +645,7 @@ Excess lowerLimits(double by_more, double poor, const PathGrid& grid, Reachabili
     for (std::size_t k = first; k <= last; ++k) {
       const bool checks = excess.acceleration > poor && !grid[k].straight && speed.checkBothEnds(k);
       speed.lower(k, checks ? 1.0 : by(excess.acceleration), by(excess.speed));
+      divided[k] = divided[k] || checks;
     }
   }
   return worst;
@@ -692,18 +697,21 @@ Outcome planKnots(const Path& path, const std::vector<TimingLimits>& limits, dou
     knots.findDurations(speed);
     if (!divideLong(kMostDeviation * path.resolution(), grid, speed, knots)) break;
   }
-  // A motion from a speed isn't slowed down afterwards if it still exceeds the limits.
-  const bool from_speed = begin_speed > 0.0;
-  const int most_plans = from_speed ? kMostPlansFromSpeed : kMostPlans;
+  std::vector<bool> divided(grid.size(), false);
   for (int plans = 1;; ++plans) {
+    divide(divided, grid, speed, knots);
     speed.plan();
     knots.make(speed);
     const bool first = plans == 1;
-    const double poor = from_speed && !first ? 1.0 : kPoorCubic;
-    const Excess excess = lowerLimits(first ? 1.0 : kLowerBy, poor, grid, speed, knots);
+    // Lowering the mean of an interval whose cubic still exceeds a limit by little may move the
+    // excess from one of its ends to the other one for ever.
+    const double poor = first ? kPoorCubic : 1.0;
+    const Excess excess = lowerLimits(first ? 1.0 : kLowerBy, poor, grid, speed, knots, divided);
     Outcome outcome{std::max(excess.acceleration, excess.speed)};
-    if (outcome.excess > 1.0 + kSmallExcess && plans < most_plans) continue;
-    if (!from_speed) outcome.slowdown = std::max(std::sqrt(excess.acceleration), excess.speed);
+    if (outcome.excess > 1.0 + kSmallExcess && plans < kMostPlans) continue;
+    // A motion from a speed can't be slowed down.
+    if (!(begin_speed > 0.0))
+      outcome.slowdown = std::max(std::sqrt(excess.acceleration), excess.speed);
     outcome.settled = knots.timeAt(speed.settledUntil(grid.firstFrom(path.openFrom())));
     return outcome;
   }

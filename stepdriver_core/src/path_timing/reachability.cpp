@@ -87,7 +87,7 @@ void Reachability::regrid(const Division& division) {
   division.spread(allowed_);
   division.spread(controllable_);
   division.spread(squares_);
-  stale_.assign(grid_.size(), false);
+  division.spread(stale_);
   for (std::size_t i = 0; i < division.intervals.size(); ++i) {
     for (std::size_t k = 0; k < division.parts; ++k) {
       stale_[division.firstPartOf(i) + k] = true;
@@ -156,7 +156,7 @@ double Reachability::capAt(std::size_t interval, const double* first) const {
     const double speed = share * limits_[j].speed;
     if (square > 0.0) cap = std::min(cap, speed * speed / square);
   }
-  const double speed = path_.speed(segment);
+  const double speed = share * path_.speed(segment);
   return sum > 0.0 ? std::min(cap, speed * speed / sum) : cap;
 }
 
