@@ -34,7 +34,7 @@ struct RoughStop {
 // it takes the distance w/2 (w/d + d/J), or w sqrt(w/J) if the deceleration doesn't reach d. With a
 // start speed, the ramp ends at that speed.
 RoughStop roughStop(double v, double a, double j, const MotionLimits& limits) {
-  const double start = startSpeed(limits);
+  const double start = limits.start_speed;
   const double level = v + a * std::abs(a) / (2.0 * limits.jerk);
   const double sign = (start > 0.0 ? v : level) < 0.0 ? -1.0 : 1.0;
   v *= sign;

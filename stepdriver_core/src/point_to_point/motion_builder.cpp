@@ -21,7 +21,7 @@ constexpr double kRounding = 1e-15;  // the rounding of the doubles of a state, 
 
 MotionBuilder::MotionBuilder(const MotionState& from, const MotionLimits& limits)
     : position_(from.position), v_(from.velocity), a_(from.acceleration) {
-  const double start = startSpeed(limits);
+  const double start = limits.start_speed;
   const bool may_rest = start > 0.0 && std::abs(from.velocity) <= start;
   if (limits.jerk == 0.0 || may_rest) a_ = 0.0;
   unround(limits);
@@ -31,7 +31,7 @@ void MotionBuilder::unround(const MotionLimits& limits) {
   if (limits.jerk == 0.0) return;
   const DoubleDouble level = levelVelocity(EndState<DoubleDouble>(v_, a_), limits);
   const double scale = std::max(std::abs(v_.hi), std::abs(level.hi));
-  for (const double speed : {0.0, startSpeed(limits), limits.max_speed}) {
+  for (const double speed : {0.0, limits.start_speed, limits.max_speed}) {
     const DoubleDouble off = DoubleDouble(std::copysign(speed, level.hi)) - level;
     if (std::abs(off.hi) > kRounding * scale) continue;
     v_ = v_ + off;
@@ -87,7 +87,7 @@ void MotionBuilder::moveOn(double sign, const MotionLimits& limits) {
 }
 
 double MotionBuilder::heading(const MotionLimits& limits) const {
-  const bool turns_at_rest = startSpeed(limits) > 0.0;
+  const bool turns_at_rest = limits.start_speed > 0.0;
   const double level =
       turns_at_rest ? v_.hi : levelVelocity(EndState<DoubleDouble>(v_, a_), limits).hi;
   return level < 0.0 || (level == 0.0 && v_.hi < 0.0) ? -1.0 : 1.0;

@@ -7,9 +7,10 @@ namespace stepdriver::motion {
 /// The acceleration applies while the speed rises, the deceleration while it falls; both apply in
 /// either direction.
 struct MotionLimits {
-  /// [microsteps/s] The speed at which the motor starts from rest, and from which it stops, without
-  /// a ramp; at most max_speed counts. With a jerk limit the acceleration is 0 at this jump: the
-  /// ramps run between the start speed and the peak as they would between 0 and a peak.
+  /// [microsteps/s] The speed at which the motor starts from rest, and from which it stops or slows
+  /// down, without a ramp; it starts at max_speed at most. With a jerk limit the acceleration is 0
+  /// at this jump: the ramps run between the start speed and the peak as they would between 0 and a
+  /// peak.
   double start_speed = 0.0;
   double max_speed = 0.0;     ///< [microsteps/s]
   double acceleration = 0.0;  ///< [microsteps/s^2]

@@ -53,7 +53,7 @@ MotionLimits stopping(const MotionBuilder& motion, const MotionLimits& limits) {
 
 // Whether it first comes to rest: with a start speed, a motion in the wrong direction does.
 bool turnsAtRest(const MotionBuilder& motion, double sign, const MotionLimits& limits) {
-  return startSpeed(limits) > 0.0 && sign * motion.v().hi < 0.0;
+  return limits.start_speed > 0.0 && sign * motion.v().hi < 0.0;
 }
 
 // The fastest motion to rest on the target, which it may overshoot.
@@ -81,7 +81,7 @@ Plan planMove(std::int64_t start_ns, const MotionState& from, std::int64_t targe
               const MotionLimits& limits) {
   Plan fastest = fastestMove(start_ns, from, target, limits);
   const double displacement = (fromInteger(target) - from.position).hi;
-  const bool may_turn = limits.jerk > 0.0 && startSpeed(limits) == 0.0 && displacement != 0.0;
+  const bool may_turn = limits.jerk > 0.0 && limits.start_speed == 0.0 && displacement != 0.0;
   if (!fastest.overshoots() || !may_turn) return fastest;
   // The fastest motion reduces its deceleration before it turns. Without that it may turn in time.
   MotionBuilder motion(from, limits);

@@ -153,7 +153,7 @@ void turn(End& phases, double sign, typename End::Real a_end, const MotionLimits
 template <typename End>
 void comeToRest(End& phases, const MotionLimits& limits) {
   using Real = typename End::Real;
-  const double start = startSpeed(limits);
+  const double start = limits.start_speed;
   if (start == 0.0) return changeVelocity(phases, Real(0.0), limits);
   if (Real(start) < abs(phases.v())) {
     const double sign = highOf(phases.v()) > 0.0 ? 1.0 : -1.0;
@@ -167,16 +167,15 @@ void comeToRest(End& phases, const MotionLimits& limits) {
 template <typename End>
 void changeToMaximum(End& phases, double sign, const MotionLimits& limits) {
   using Real = typename End::Real;
-  const double start = startSpeed(limits);
+  const double start = limits.start_speed;
+  const double top = limits.max_speed;
   if (start > 0.0) {
-    if (!(Real(start) < abs(phases.v()))) phases.settle(sign * start, 0.0);
-    dropToStartSpeed(Mirrored<End>(phases, sign), start, limits);
+    const bool ramps = Real(start) < abs(phases.v());
+    const bool dropped = ramps && dropToStartSpeed(Mirrored<End>(phases, sign), start, limits);
+    if (ramps && !dropped && top < start) changeVelocity(phases, Real(sign * start), limits);
+    if (!ramps || top < start) phases.settle(sign * std::min(start, top), 0.0);
   }
-  changeVelocity(phases, Real(sign * limits.max_speed), limits);
-}
-
-double startSpeed(const MotionLimits& limits) {
-  return std::min(limits.start_speed, limits.max_speed);
+  changeVelocity(phases, Real(sign * top), limits);
 }
 
 using Search = EndState<double>;

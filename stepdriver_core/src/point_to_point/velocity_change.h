@@ -48,6 +48,4 @@ void comeToRest(End& phases, const MotionLimits& limits);
 template <typename End>
 void changeToMaximum(End& phases, double sign, const MotionLimits& limits);
 
-double startSpeed(const MotionLimits& limits);
-
 }  // namespace stepdriver::motion

@@ -72,6 +72,18 @@ std::vector<bool> enabledAxes(const Bench& bench) {
   return enabled;
 }
 
+TEST(Machine, SlowsAnAxisDownWithoutPassingItsTargetIfItsStartSpeedAllowsThat) {
+  config::AxisConfig config = linearAxis("x");
+  config.start_speed = config.max_speed;
+  Bench bench({config});
+  const axis::Move move = bench.axis("x").moveTo(0.003);
+  bench.machine->advance(0.01);
+  bench.machine->setSpeedOverride(0.4);  // by a ramp that would take 4.2 mm
+  EXPECT_EQ(bench.axis("x").wait(move).end, axis::MoveEnd::kReached);
+  EXPECT_EQ(bench.report().pulses_forward, 240);
+  EXPECT_EQ(bench.report().pulses_backward, 0);
+}
+
 TEST(Machine, EnablesAndDisablesAllAxesAtOnce) {
   std::vector<config::AxisConfig> configs = {linearAxis("x"), linearAxis("y", "drv8825"),
                                              linearAxis("always_on")};

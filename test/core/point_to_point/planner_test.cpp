@@ -211,6 +211,28 @@ TEST(StartSpeed, AboveTheMaximumIsCutToIt) {
   EXPECT_DOUBLE_EQ(seconds(plan.profile), 1.0);
 }
 
+TEST(StartSpeed, IsLeftAtOnceForALowerMaximum) {
+  for (const double jerk : {0.0, 20000.0}) {
+    for (const double v : {100.0, 300.0, 500.0}) {
+      const Plan plan = planMove(0, at(0, v), 50, {500, 100, 2000, 2000, jerk});
+      EXPECT_EQ(plan.overshoot, 0.0) << v;
+      EXPECT_EQ(plan.profile.pieces().size(), 1U) << v;
+      EXPECT_DOUBLE_EQ(seconds(plan.profile), 0.5) << v;
+    }
+  }
+}
+
+TEST(StartSpeed, IsWhereARampToALowerMaximumEnds) {
+  // From 700 to 500 the ramp takes 0.1 s and 60 microsteps, and 0.2 s and 120 with its jerk.
+  for (const double jerk : {0.0, 20000.0}) {
+    const double ramp = jerk > 0.0 ? 0.2 : 0.1;
+    const Plan plan = planMove(0, at(0, 700), 150, {500, 100, 2000, 2000, jerk});
+    EXPECT_EQ(plan.overshoot, 0.0) << jerk;
+    EXPECT_DOUBLE_EQ(seconds(plan.profile), ramp + (150.0 - 600.0 * ramp) / 100.0) << jerk;
+    EXPECT_EQ(plan.profile.pieces().back().v0, 100.0) << jerk;
+  }
+}
+
 // ---- stop ----
 
 TEST(PlanStop, DeceleratesAtTheDecelerationToTheFirstWholeMicrostep) {

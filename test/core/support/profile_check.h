@@ -18,7 +18,7 @@ class ProfileCheck {
  public:
   ProfileCheck(const Profile& profile, const MotionState& from, const MotionLimits& limits)
       : profile_(profile), from_(from), limits_(limits) {
-    start_ = std::min(limits.start_speed, limits.max_speed);
+    start_ = limits.start_speed;
     may_rest_ = start_ > 0.0 && std::abs(from.velocity) <= start_;
     const double a = may_rest_ ? 0.0 : from.acceleration;
     level_ = from.velocity;
@@ -110,8 +110,8 @@ class ProfileCheck {
   double fastestStop() const {
     const double a = limits_.acceleration;
     const double d = limits_.deceleration;
-    return std::max(
-        {std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)), start_});
+    return std::max({std::abs(from_.velocity), std::abs(level_), std::sqrt(2.0 * a * d / (a + d)),
+                     std::min(start_, limits_.max_speed)});
   }
 
   /// The error of the position from rounding a state to doubles, if it moves. It is largest just
@@ -175,7 +175,8 @@ class ProfileCheck {
     const double brought_back = first_a_ - limits_.jerk * (time + t);
     EXPECT_LE(std::abs(a), std::max(limit, brought_back) + accelerationDoubt())
         << "at " << time + t << " s, v " << v;
-    if (std::abs(v) > limits_.max_speed + speedDoubt() && speeds_up) {
+    const bool rises = speeds_up && std::abs(a) > accelerationDoubt();
+    if (std::abs(v) > limits_.max_speed + speedDoubt() && rises) {
       EXPECT_LT(piece.j * a, 0.0) << "speeds up above the limit, at " << time + t << " s";
     }
   }
