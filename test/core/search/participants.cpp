@@ -743,6 +743,9 @@ void Participants::noteGoals(Ask& asked) {
 // Now it is handed to the controller.
 void Participants::noteServed(Ask& asked) {
   beginHulls(asked);
+  for (const std::size_t axis : asked.goals) {
+    for (const std::size_t other : asked.goals) together_[axis][other] |= asked.together;
+  }
   if (const auto* set = std::get_if<machine::SetLimits>(&asked.request)) noteLimits(*set);
   const auto found = open_.find(asked.id);
   close_was_served_ |= std::holds_alternative<machine::Close>(asked.request);
@@ -898,8 +901,23 @@ double firstSegmentTime(bool begins_later) { return begins_later ? 0.4 : 0.25; }
 
 }  // namespace
 
+// Whether the request takes an axis away from a motion that this one makes with it: it then comes
+// to rest by its own limits, and not along that motion.
+bool Participants::leavesBehind(const Ask& asked, std::size_t axis) {
+  bool takes_other = false;
+  for (std::size_t other = 0; other < kAxes; ++other) {
+    takes_other |= asked.meaning.axes[other] && together_[axis][other];
+  }
+  return asked.meaning.moves && takes_other && !asked.meaning.axes[axis] &&
+         !mayRest(axis, asked.id);
+}
+
 void Participants::beginHulls(const Ask& asked) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    if (leavesBehind(asked, axis)) {
+      const double here = placeOnRig(axis);
+      hulls_[axis].allow(here - stoppingWay(axis), here + stoppingWay(axis));
+    }
     const bool moves = asked.meaning.moves && asked.meaning.axes[axis];
     if (!moves) continue;
     const double backlash = configs_[axis].backlash * configs_[axis].steps_per_unit;

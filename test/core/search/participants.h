@@ -294,6 +294,7 @@ class Participants : private machine::ShellCore::Host {
   double stoppingWay(std::size_t axis) const;
   void noteLimits(const machine::SetLimits& set);
   void passes(std::size_t motor);
+  bool leavesBehind(const Ask& asked, std::size_t axis);
   void beginHulls(const Ask& asked);
   void widenHull(const Ask& asked, std::size_t axis);
   void checkHull(std::size_t axis);
@@ -360,6 +361,7 @@ class Participants : private machine::ShellCore::Host {
   std::array<std::uint64_t, kAxes> last_move_{};
   std::array<std::vector<Ordered>, kAxes> ordered_;
   std::array<bool, kAxes> had_setpoints_{};
+  std::array<std::array<bool, kAxes>, kAxes> together_{};  // have ever been in one motion
   std::array<bool, kAxes> steps_failed_{};
   std::array<bool, kAxes> chip_broke_{};
   std::optional<pulse::Nanoseconds> power_lost_since_;
