@@ -13,9 +13,13 @@
 namespace stepdriver::axis {
 namespace {
 
-std::string remedyFor(int error) {
-  return error == ENODEV ? "plug it in and start the node again"
-                         : "check the cable and the supply of its chip";
+/// What has happened, and what to do about it.
+std::string causeOf(const pulse::LineFailure& failure, const LineNames& names) {
+  const std::string known = names.failure ? names.failure(failure.input, failure.line) : "";
+  if (!known.empty()) return known + "; start the node again";
+  return fmt::format("{}; {}", gpio::errorText(failure.error),
+                     failure.error == ENODEV ? "plug it in and start the node again"
+                                             : "check the cable and the supply of its chip");
 }
 
 using Roles = std::vector<std::pair<int, const char*>>;
@@ -74,9 +78,8 @@ std::string lineFailureText(const pulse::LineFailure& failure, const config::Axi
   const std::string& line_name =
       failure.input ? names.input(failure.line) : names.output(failure.line);
   const auto [role, of_motor] = roleOf(failure, axis, own);
-  return fmt::format("the {} line {}{} can't be {}: {}; {}", role, line_name, of_motor,
-                     failure.input ? "read" : "written", gpio::errorText(failure.error),
-                     remedyFor(failure.error));
+  return fmt::format("the {} line {}{} can't be {}: {}", role, line_name, of_motor,
+                     failure.input ? "read" : "written", causeOf(failure, names));
 }
 
 }  // namespace stepdriver::axis

@@ -77,6 +77,9 @@ class Machine::Impl {
     for (std::size_t i = 0; i < wiring.inputs.size(); ++i) {
       names_.inputs.push_back(lines_->inputName(static_cast<int>(i)));
     }
+    names_.failure = [&lines = *lines_](bool input, int line) {
+      return lines.failureText(input, line);
+    };
     engine_ = makeEngine(wiring, options);
     engine_->switchOutputs(wiring.switchedOutputs(options));
     controller_ = std::make_unique<Controller>(

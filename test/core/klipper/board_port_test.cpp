@@ -305,7 +305,8 @@ TEST_F(BoardPortTest, StopsWithItsReasonWhenTheFirmwareShutsDown) {
     EXPECT_TRUE(heard(channel).doubtful);
     EXPECT_EQ(heard(channel).played + heard(channel).given_back, put_[channel]);
   }
-  EXPECT_EQ(on->backend.reason(), "the firmware of the board mcu has shut down: Timer too close");
+  EXPECT_EQ(on->held->failureText(false, 0),
+            "the firmware of the board mcu has shut down: Timer too close");
 }
 
 TEST_F(BoardPortTest, StopsWhenTheBoardIsResetOrItsCableIsPulled) {
@@ -322,7 +323,7 @@ TEST_F(BoardPortTest, StopsWhenTheBoardIsResetOrItsCableIsPulled) {
     EXPECT_EQ(heard().failure.error, ENODEV) << pulled;
     EXPECT_TRUE(heard().doubtful);
     EXPECT_EQ(heard().played + heard().given_back, put_[0]);
-    const std::string reason = on->backend.reason();
+    const std::string reason = on->held->failureText(false, 0);
     EXPECT_NE(reason.find(pulled ? "line to the board mcu" : "board mcu was reset"),
               std::string::npos)
         << reason;
@@ -369,7 +370,7 @@ TEST_F(BoardPortTest, LetsTheBoardSwitchOffWhenTheProgramStandsStill) {
   EXPECT_EQ(heard().failure.error, EREMOTEIO);
   EXPECT_TRUE(heard().doubtful);
   EXPECT_EQ(riseCount(0), rises) << "steps went out afterwards";
-  EXPECT_NE(on->backend.reason().find("Missed scheduling"), std::string::npos);
+  EXPECT_NE(on->held->failureText(false, 0).find("Missed scheduling"), std::string::npos);
 }
 
 TEST_F(BoardPortTest, KeepsAnOutputOnAsLongAsItIsServed) {

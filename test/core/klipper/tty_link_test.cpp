@@ -149,7 +149,7 @@ TEST(TtyLink, CarriesTheStepsOfAMotionToABoard) {
     clock.waitUntil(std::min(port->due(), now + kMillisecond));
   }
   EXPECT_EQ(ear.heard[0].played, static_cast<std::size_t>(kSteps))
-      << backend.reason() << ", error " << ear.heard[0].failure.error << ", stopped "
+      << lines->failureText(false, 0) << ", error " << ear.heard[0].failure.error << ", stopped "
       << ear.heard[0].stopped.has_value();
   EXPECT_EQ(ear.heard[0].count, kSteps / 5);
   EXPECT_EQ(terminal.pins.rises[2], kSteps);

@@ -93,6 +93,12 @@ class Lines {
   virtual const std::string& outputName(int output) const = 0;
   virtual const std::string& inputName(int input) const = 0;
 
+  /// What has happened to the chip of a line that can't be used any more, in words, if more is
+  /// known of it than the errno of a call; else empty. For any thread.
+  ///
+  /// @param input whether `line` is the index of an input, else of an output.
+  virtual std::string failureText(bool /*input*/, int /*line*/) const { return {}; }
+
   /// The number of an output's chip, which is the same for all outputs of a chip: a chip that hangs
   /// must not delay writes to others.
   virtual std::size_t outputChip(int /*output*/) const { return 0; }

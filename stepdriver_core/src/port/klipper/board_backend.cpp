@@ -167,6 +167,12 @@ class BoardBackend::HeldLines final : public gpio::Lines {
     const Input& line = *inputs_.at(static_cast<std::size_t>(input));
     return line.board != nullptr ? line.name : base_->inputName(line.base);
   }
+  std::string failureText(bool input, int line) const override {
+    const auto index = static_cast<std::size_t>(line);
+    const Board* board = input ? inputs_.at(index)->board : outputs_.at(index).board;
+    if (board != nullptr) return board->reason();
+    return base_->failureText(input, input ? inputs_.at(index)->base : outputs_.at(index).base);
+  }
   std::size_t outputChip(int output) const override {
     const Output& line = outputs_.at(static_cast<std::size_t>(output));
     if (line.board == nullptr) return base_->outputChip(line.base);
@@ -359,14 +365,6 @@ std::unique_ptr<gpio::Lines> BoardBackend::request(const std::vector<gpio::Outpu
   lines->hold(outputs, inputs);
   held_ = lines.get();
   return lines;
-}
-
-std::string BoardBackend::reason() const {
-  if (held_ == nullptr) return "";
-  for (const auto& board : held_->boards_) {
-    if (board->failure() != 0) return board->reason();
-  }
-  return "";
 }
 
 std::unique_ptr<pulse::StepPort> BoardBackend::makePort(

@@ -47,9 +47,6 @@ class BoardBackend final : public pulse::PortBackend {
       gpio::Lines& lines, pulse::Clock& clock,
       const std::vector<pulse::ChannelConfig>& lanes) override;
 
-  /// Why a board can't be used any more, in words; empty: none has failed. For any thread.
-  std::string reason() const;
-
  private:
   class HeldLines;
 
