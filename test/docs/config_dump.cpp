@@ -36,10 +36,11 @@ class Dump {
     all(brake.line, brake.release_level, brake.release_ns, brake.engage_ns);
   }
   void add(const config::StallConfig& stall) { all(stall.threshold, stall.current, stall.phase); }
+  void add(const config::StallFaultConfig& stall) { all(stall.threshold, stall.above); }
   void add(const config::TmcConfig& tmc) {
     all(tmc.port, tmc.baud, tmc.address, tmc.sense_resistor, tmc.run_current, tmc.hold_current,
         tmc.hold_delay, static_cast<int>(tmc.mode), tmc.spread_cycle_above, tmc.interpolate,
-        tmc.stall);
+        tmc.stall, tmc.stall_fault, tmc.idle_current);
   }
   void add(const config::HomingConfig& homing) {
     all(static_cast<int>(homing.kind), homing.at_max, homing.input, homing.flag, homing.approaches,

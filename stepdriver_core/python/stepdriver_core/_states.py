@@ -107,7 +107,7 @@ class AxisState:
     brake_engaged: bool
     """The line of its brake has the level that engages it."""
     idle: bool
-    """Disabled or asleep by its idle timeout; the next motion ends that."""
+    """Disabled, asleep or at a lower current by its idle timeout; the next motion ends that."""
     moving: bool
     """It moves."""
     held: bool

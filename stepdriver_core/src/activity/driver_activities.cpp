@@ -151,6 +151,10 @@ Steps GoIdle::plan() {
           axis.motor.power().setIdle(true);
           axis.noteAsleep();
         }));
+  } else if (axis.config.idle_action == config::IdleAction::kLowerCurrent) {
+    // The controller writes the register. The motor keeps holding the load.
+    add(steps, std::make_unique<RunStep>([&axis] { axis.motor.power().setIdle(true); }));
+    return steps;
   } else {
     add(steps, enableStep(context(), axis, false, [&axis] { axis.motor.power().setIdle(true); }));
   }

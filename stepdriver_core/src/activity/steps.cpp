@@ -207,6 +207,14 @@ Steps wakeSteps(Context& context, axis::AxisModel& axis) {
     return steps;
   }
   const auto awake = [&axis] { axis.motor.power().setIdle(false); };
+  if (axis.config.idle_action == config::IdleAction::kLowerCurrent) {
+    // The current of a motion is another one, so it needn't wait.
+    steps.push_back(std::make_unique<RunStep>(awake));
+    if (axis.motor.brake().isWired()) {
+      steps.push_back(std::make_unique<ReleaseBrakeStep>(context, axis));
+    }
+    return steps;
+  }
   if (axis.config.idle_action == config::IdleAction::kSleep) {
     steps.push_back(pinsStep(context, axis, axis.motor.pins().sleep(false), awake));
   } else {

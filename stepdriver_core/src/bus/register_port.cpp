@@ -15,7 +15,7 @@ std::string causeOf(Failure failure) {
              "resistor between TX and RX, is missing, or it is another port";
     case Failure::kOnlyEcho:
       return "no chip answers: it has no motor supply, or another address (MS1, MS2), or PDN_UART "
-             "isn't connected";
+             "isn't connected, or it can't measure this baud rate";
     case Failure::kNoEcho:
       return "the bytes that were sent don't come back: connect RX to the wire, too";
     case Failure::kGarbled:

@@ -263,13 +263,13 @@ void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisCon
 void readSpeedsOfChips(ConfigReader& axis, AxisConfig& config) {
   if (config.steps_per_unit <= 0.0) return;
   if (config.twins.empty()) {
-    if (config.tmc) readTmcSpeeds(axis, config, *config.tmc);
+    if (config.tmc) readTmcSpeeds(axis, config, config.driver, *config.tmc);
     return;
   }
   ConfigReader motors = axis.map("motors");
   const auto read = [&](MotorConfig& motor) {
     ConfigReader reader = motors.map(motor.motor);
-    if (motor.tmc) readTmcSpeeds(reader, config, *motor.tmc);
+    if (motor.tmc) readTmcSpeeds(reader, config, motor.driver, *motor.tmc);
   };
   read(config);
   for (MotorConfig& twin : config.twins) read(twin);

@@ -1,8 +1,13 @@
 #pragma once
 
+#include <string>
+
 #include "config/config_reader.h"
 
 namespace stepdriver::config {
+
+/// As in files: "disable".
+std::string textOf(IdleAction action);
 
 /// Reads when the motor has current, and what happens without it.
 ///

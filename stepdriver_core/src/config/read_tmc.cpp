@@ -33,6 +33,10 @@ const char* aboveKey(Kind kind) {
   return kind == Kind::kLinear ? "spreadcycle_above_mm_s" : "spreadcycle_above_deg_s";
 }
 
+const char* stallFaultKey(Kind kind) {
+  return kind == Kind::kLinear ? "stall_fault_above_mm_s" : "stall_fault_above_deg_s";
+}
+
 /// [mm|degrees] of a full step of an axis.
 double fullStepTravel(const AxisConfig& axis) {
   const auto units_per_si = static_cast<double>(motionKeys(axis.kind).units_per_si_unit);
@@ -60,10 +64,14 @@ class TmcReader {
     if (const auto edges = reader_.findOneOf("step_edges", kEdges, Presence::kOptional)) {
       chip_.both_edges = edges == kEdges.back();
     }
-    for (const Kind kind : {Kind::kLinear, Kind::kRotary}) reader_.allow(aboveKey(kind));
+    for (const Kind kind : {Kind::kLinear, Kind::kRotary}) {
+      reader_.allow(aboveKey(kind));
+      reader_.allow(stallFaultKey(kind));
+    }
     const bool has_stall = readStall(config);
-    config.hold_delay =
-        reader_.number("hold_delay_s", {0.0, tmc::longestHoldDelay()}, config.hold_delay);
+    readStallFault(config);
+    config.hold_delay = reader_.number(
+        "hold_delay_s", {0.0, tmc::longestHoldDelay(tmc::modelOf(chip_.name))}, config.hold_delay);
     readCurrents(config);
     if (has_stall) readStallCurrent(config);
     reader_.rejectUnknown();
@@ -88,20 +96,33 @@ class TmcReader {
       }
       return false;
     }
-    if (tmc::modelOf(chip_.name) != tmc::Model::kTmc2209) {
-      reader_.contradiction("stall_threshold",
-                            fmt::format("is {}, but is only for the TMC2209 and TMC2226",
-                                        reader_.shown("stall_threshold")));
-    }
-    if (config.mode == ChopperMode::kSpreadCycle) {
-      reader_.contradiction("stall_threshold",
-                            fmt::format("is {}, but the chip detects stalls in stealthchop only",
-                                        reader_.shown("stall_threshold")));
-    }
+    refuseUnlessDetected("stall_threshold", config);
     config.stall.emplace();
     config.stall->threshold = threshold;
     if (reader_.has("stall_phase")) config.stall->phase = phase;
     return reader_.issues().size() == before;
+  }
+
+  void refuseUnlessDetected(const char* key, const TmcConfig& config) {
+    if (tmc::modelOf(chip_.name) != tmc::Model::kTmc2209) {
+      reader_.contradiction(
+          key, fmt::format("is {}, but is only for the TMC2209 and TMC2226", reader_.shown(key)));
+    }
+    if (config.mode == ChopperMode::kSpreadCycle) {
+      reader_.contradiction(key,
+                            fmt::format("is {}, but the chip detects stalls in stealthchop only",
+                                        reader_.shown(key)));
+    }
+  }
+
+  /// Its speed is read by readTmcSpeeds().
+  void readStallFault(TmcConfig& config) {
+    constexpr const char* kKey = "stall_fault_threshold";
+    const int threshold = reader_.integer(kKey, 0, kMostThreshold, 0);
+    if (!reader_.has(kKey)) return;
+    refuseUnlessDetected(kKey, config);
+    config.stall_fault.emplace();
+    config.stall_fault->threshold = threshold;
   }
 
   void readStallCurrent(TmcConfig& config) {
@@ -159,6 +180,7 @@ class TmcReader {
         reader_.findNumber("sense_resistor_mohm", kResistors, Presence::kRequired);
     const auto run = reader_.findNumber("run_current_a", Range::positive(), Presence::kRequired);
     const auto hold = reader_.findNumber("hold_current_a", Range::positive(), Presence::kOptional);
+    const auto idle = reader_.findNumber("idle_current_a", Range::positive(), Presence::kOptional);
     if (!resistor || !run) return;
     const double sense = *resistor * kMilliohm;
     config.sense_resistor = sense;
@@ -169,7 +191,9 @@ class TmcReader {
     }
     const double least = tmc::lowestHold(*run, board);
     config.hold_current = hold.value_or(std::max(*run * kHalf, least));
-    isWithin("hold_current_a", config.hold_current, least, *run);
+    if (!isWithin("hold_current_a", config.hold_current, least, *run)) return;
+    config.idle_current = idle;
+    if (idle) isWithin("idle_current_a", *idle, least, config.hold_current);
   }
 
   ConfigReader reader_;
@@ -194,6 +218,8 @@ ConfigValue::Map writtenTmc(const TmcConfig& tmc) {
                                 {"mode", kModes.at(tmc.mode == ChopperMode::kSpreadCycle ? 1 : 0)},
                                 {"interpolate", tmc.interpolate}};
   map.insert(others.begin(), others.end());
+  if (tmc.idle_current) map["idle_current_a"] = *tmc.idle_current;
+  if (tmc.stall_fault) map["stall_fault_threshold"] = tmc.stall_fault->threshold;
   if (tmc.stall) {
     map["stall_threshold"] = tmc.stall->threshold;
     map["stall_current_a"] = tmc.stall->current;
@@ -242,38 +268,103 @@ std::optional<TmcConfig> readTmc(ConfigReader& motor, std::optional<driver::Driv
   return TmcReader(motor, *chip).read(used);
 }
 
-void readTmcSpeeds(ConfigReader& motor, const AxisConfig& axis, TmcConfig& tmc) {
-  ConfigReader reader = motor.map("tmc");
-  const char* const key = aboveKey(axis.kind);
-  const char* const other = aboveKey(axis.kind == Kind::kLinear ? Kind::kRotary : Kind::kLinear);
-  if (reader.has(other)) {
-    reader.contradiction(
-        other, fmt::format("is {}, but the axis's speeds are in {}/s: give {}", reader.shown(other),
-                           motionKeys(axis.kind).unit, reader.fullName(key)));
+namespace {
+
+/// Reads a speed of the motor, which the chip compares with that of its steps.
+class ChipSpeedReader {
+ public:
+  ChipSpeedReader(ConfigReader& motor, const AxisConfig& axis, tmc::Model model)
+      : reader_(motor.map("tmc")), axis_(axis), model_(model) {}
+
+  /// @param keyOf its key, by the kind of the axis.
+  /// @return [full steps/s]; empty if it isn't there, or is reported.
+  std::optional<double> read(const char* (*keyOf)(Kind)) {
+    refuseOther(keyOf);
+    const char* const key = keyOf(axis_.kind);
+    const auto speed = reader_.findNumber(key, Range::positive(), Presence::kOptional);
+    if (!speed) return {};
+    const double least = tmc::lowestThreshold(model_) * fullStepTravel(axis_);
+    const double most = tmc::highestThreshold(model_) * fullStepTravel(axis_);
+    if (*speed >= least && *speed <= most) return *speed / fullStepTravel(axis_);
+    reader_.issue(key,
+                  fmt::format("is {}, but must be from {} to {}: the chip compares no other "
+                              "speeds with this travel of a step",
+                              reader_.shown(key), lowerBoundText(least), upperBoundText(most)));
+    return {};
   }
-  const auto above = reader.findNumber(key, Range::positive(), Presence::kOptional);
+  ConfigReader& reader() { return reader_; }
+
+ private:
+  void refuseOther(const char* (*keyOf)(Kind)) {
+    const char* const other = keyOf(axis_.kind == Kind::kLinear ? Kind::kRotary : Kind::kLinear);
+    if (!reader_.has(other)) return;
+    reader_.contradiction(other, fmt::format("is {}, but the axis's speeds are in {}/s: give {}",
+                                             reader_.shown(other), motionKeys(axis_.kind).unit,
+                                             reader_.fullName(keyOf(axis_.kind))));
+  }
+
+  ConfigReader reader_;
+  const AxisConfig& axis_;
+  const tmc::Model model_;
+};
+
+void readSpreadCycleAbove(ChipSpeedReader& speeds, const AxisConfig& axis, TmcConfig& tmc) {
+  const auto above = speeds.read(aboveKey);
   if (!above) return;
+  const char* const key = aboveKey(axis.kind);
   if (tmc.mode == ChopperMode::kSpreadCycle) {
-    reader.contradiction(key, fmt::format("is {}, but is only for mode stealthchop: the mode is "
-                                          "spreadcycle at each speed",
+    speeds.reader().contradiction(
+        key, fmt::format("is {}, but is only for mode stealthchop: the mode is spreadcycle at each "
+                         "speed",
+                         speeds.reader().shown(key)));
+    return;
+  }
+  tmc.spread_cycle_above = *above;
+}
+
+void readStallFaultAbove(ChipSpeedReader& speeds, const AxisConfig& axis, TmcConfig& tmc) {
+  ConfigReader& reader = speeds.reader();
+  const auto above = speeds.read(stallFaultKey);
+  const char* const key = stallFaultKey(axis.kind);
+  const auto needs = [&reader](const char* given, const char* missing) {
+    reader.contradiction(given, fmt::format("is {}, but {} is missing", reader.shown(given),
+                                            reader.fullName(missing)));
+  };
+  if (!tmc.stall_fault) {
+    if (reader.has(key)) needs(key, "stall_fault_threshold");
+    return;
+  }
+  if (!reader.has(key)) return needs("stall_fault_threshold", key);
+  if (!above) return;
+  tmc.stall_fault->above = *above;
+  if (tmc.spread_cycle_above > 0.0 && *above >= tmc.spread_cycle_above) {
+    reader.contradiction(key, fmt::format("is {}, but must be below {}: the chip detects stalls in "
+                                          "stealthchop only",
+                                          reader.shown(key), reader.fullName(aboveKey(axis.kind))));
+  }
+  if (*above * fullStepTravel(axis) >= axis.max_speed * motionKeys(axis.kind).units_per_si_unit) {
+    reader.contradiction(key, fmt::format("is {}, but must be below the axis's highest speed: a "
+                                          "stall would never be detected",
                                           reader.shown(key)));
-    return;
   }
-  const double least = tmc::lowestThreshold() * fullStepTravel(axis);
-  const double most = tmc::highestThreshold() * fullStepTravel(axis);
-  if (*above < least || *above > most) {
-    reader.issue(key, fmt::format("is {}, but must be from {} to {}: the chip compares no other "
-                                  "speeds with this travel of a step",
-                                  reader.shown(key), lowerBoundText(least), upperBoundText(most)));
-    return;
-  }
-  tmc.spread_cycle_above = *above / fullStepTravel(axis);
+}
+
+}  // namespace
+
+void readTmcSpeeds(ConfigReader& motor, const AxisConfig& axis, const driver::DriverChip& chip,
+                   TmcConfig& tmc) {
+  ChipSpeedReader speeds(motor, axis, tmc::modelOf(chip.name));
+  readSpreadCycleAbove(speeds, axis, tmc);
+  readStallFaultAbove(speeds, axis, tmc);
 }
 
 ConfigValue::Map writeTmc(const TmcConfig& tmc, const AxisConfig& axis) {
   ConfigValue::Map map = writtenTmc(tmc);
   if (tmc.spread_cycle_above > 0.0) {
     map[aboveKey(axis.kind)] = tmc.spread_cycle_above * fullStepTravel(axis);
+  }
+  if (tmc.stall_fault) {
+    map[stallFaultKey(axis.kind)] = tmc.stall_fault->above * fullStepTravel(axis);
   }
   return map;
 }

@@ -35,7 +35,8 @@ std::optional<TmcConfig> readTmc(ConfigReader& motor, std::optional<driver::Driv
 
 /// Reads the speeds in it, which need the scale of the axis.
 /// @param motor as for readTmc(). @pre readMotion()
-void readTmcSpeeds(ConfigReader& motor, const AxisConfig& axis, TmcConfig& tmc);
+void readTmcSpeeds(ConfigReader& motor, const AxisConfig& axis, const driver::DriverChip& chip,
+                   TmcConfig& tmc);
 
 /// The map `tmc` as a file would have it.
 ConfigValue::Map writeTmc(const TmcConfig& tmc, const AxisConfig& axis);

@@ -12,6 +12,7 @@
 #include "read_homing.h"
 #include "read_motors.h"
 #include "read_pins.h"
+#include "read_power.h"
 #include "read_shaper.h"
 #include "read_tmc.h"
 
@@ -157,7 +158,7 @@ class AxisWriter {
     map_["holds_position_unpowered"] = axis_.holds_position_unpowered;
     map_["align_on_microstep_change"] = axis_.align_on_microstep_change;
     map_["idle_timeout_s"] = axis_.idle_timeout;
-    map_["idle_action"] = axis_.idle_action == IdleAction::kSleep ? "sleep" : "disable";
+    map_["idle_action"] = textOf(axis_.idle_action);
     if (!axis_.brake) return;
     map_["brake"] = ConfigValue::Map{{"pin", axis_.brake->line},
                                      {"release_level", levelText(axis_.brake->release_level)},

@@ -9,8 +9,12 @@
 namespace stepdriver::driver::tmc {
 namespace {
 
-// TMC2209, section 9.2, and TMC2130, section 9: the full-scale voltages across the sense resistor
-// [V], to which the chip adds 20 mOhm. The TMC5160 (section 9) adds nothing, and has no vsense.
+// The full-scale voltages across the sense resistor [V], to which the chip adds 20 mOhm: VSRT in
+// the electrical characteristics, and the formula in section 9 of each datasheet. The table of
+// TMC2209 (rev. 1.03, section 8: 100 mOhm 1.92 A, 120 mOhm 1.64 A, 150 mOhm 1.35 A, 220 mOhm 0.96
+// A) is met by 0.325 V to its last digit, and so is the one of TMC5160 up to 100 mOhm (2.3 A),
+// which adds no resistance and has no vsense. For the TMC2130 the firmware Klipper computes with
+// 0.32 V and 0.18 V, TMCStepper with 0.325 V: 1.6 % apart, which is half of a step of the scale.
 constexpr double kFullScale = 0.325;      // vsense 0
 constexpr double kFullScale2130 = 0.320;  // the same
 constexpr double kFineFullScale = 0.180;  // vsense 1
@@ -22,13 +26,15 @@ constexpr int kScales = 32;
 constexpr double kRounding = 1e-9;
 
 constexpr double kClock = 12e6;  // [Hz]
+// TMC2130, electrical characteristics: 13.2 MHz at 50 degrees C, as Klipper computes, too.
+constexpr double kClock2130 = 13.2e6;
 
 // Section 5.2: TSTEP counts clocks in 20 bits, and the thresholds are compared with it.
 constexpr double kMostThreshold = (1U << 20U) - 1;
 
 // Section 5.2: TPOWERDOWN counts 2^18 clocks. Below 2, StealthChop can't find the
 // current at rest.
-constexpr double kPowerDownUnit = 262144.0 / kClock;
+constexpr double kPowerDownClocks = 262144.0;
 constexpr double kLeastPowerDown = 2.0;
 constexpr double kMostPowerDown = 255.0;
 
@@ -128,6 +134,8 @@ Model modelOf(const std::string& chip) {
   return chip == "tmc5160" ? Model::kTmc5160 : Model::kTmc2209;
 }
 
+double clockOf(Model model) { return model == Model::kTmc2130 ? kClock2130 : kClock; }
+
 std::uint32_t versionOf(Model model) {
   switch (model) {
     case Model::kTmc2208:
@@ -208,20 +216,20 @@ CurrentScale scaleOf(double run, double hold, const Board& board) {
   return scale;
 }
 
-double longestHoldDelay() { return kMostPowerDown * kPowerDownUnit; }
+double longestHoldDelay(Model model) { return kMostPowerDown * kPowerDownClocks / clockOf(model); }
 
-std::uint32_t powerDownOf(double delay) {
-  return static_cast<std::uint32_t>(
-      std::clamp(std::round(delay / kPowerDownUnit), kLeastPowerDown, kMostPowerDown));
+std::uint32_t powerDownOf(double delay, Model model) {
+  const double units = std::round(delay * clockOf(model) / kPowerDownClocks);
+  return static_cast<std::uint32_t>(std::clamp(units, kLeastPowerDown, kMostPowerDown));
 }
 
-double lowestThreshold() { return kClock / (kFinest * kMostThreshold); }
-double highestThreshold() { return kClock / kFinest; }
+double lowestThreshold(Model model) { return clockOf(model) / (kFinest * kMostThreshold); }
+double highestThreshold(Model model) { return clockOf(model) / kFinest; }
 
-std::uint32_t thresholdOf(double speed) {
+std::uint32_t thresholdOf(double speed, Model model) {
   if (speed <= 0.0) return 0;
   return static_cast<std::uint32_t>(
-      std::clamp(std::round(kClock / (kFinest * speed)), 1.0, kMostThreshold));
+      std::clamp(std::round(clockOf(model) / (kFinest * speed)), 1.0, kMostThreshold));
 }
 
 std::uint32_t currentsOf(const CurrentScale& current) {
@@ -240,14 +248,22 @@ std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on) {
   return value;
 }
 
+std::uint32_t gconfOf(const Settings& settings) {
+  if (isOnSpi(settings.model)) {
+    return kGconfErrorsOnDiag0 | (settings.spread_cycle ? 0 : kGconfStealthChopOnSpi);
+  }
+  return kGconfUartPin | kGconfMicrostepsByMres | kGconfFilter |
+         (settings.spread_cycle ? kGconfSpreadCycle : 0);
+}
+
 std::vector<RegisterValue> setUpOnSpi(const Settings& settings, int microsteps) {
   const bool is_5160 = settings.model == Model::kTmc5160;
   std::vector<RegisterValue> all{
       {kChopconf, chopconfOf(settings, microsteps, false), true},
-      {kGconf, kGconfErrorsOnDiag0 | (settings.spread_cycle ? 0 : kGconfStealthChopOnSpi), true},
+      {kGconf, gconfOf(settings), true},
       {kIholdIrun, currentsOf(settings.current), false},
-      {kTpowerdown, powerDownOf(settings.hold_delay), false},
-      {kTpwmthrs, thresholdOf(settings.spread_cycle_above), false},
+      {kTpowerdown, powerDownOf(settings.hold_delay, settings.model), false},
+      {kTpwmthrs, thresholdOf(settings.spread_cycle_above, settings.model), false},
       {kTcoolthrs, 0, false},
       {kCoolconfOnSpi, 0, false},
       {kPwmconf, is_5160 ? kPwmconf5160 : kPwmconf2130, false},
@@ -262,21 +278,20 @@ std::vector<RegisterValue> setUpOnSpi(const Settings& settings, int microsteps) 
 
 std::vector<RegisterValue> setUpOf(const Settings& settings, int microsteps) {
   if (isOnSpi(settings.model)) return setUpOnSpi(settings, microsteps);
-  std::uint32_t gconf = kGconfUartPin | kGconfMicrostepsByMres | kGconfFilter;
-  if (settings.spread_cycle) gconf |= kGconfSpreadCycle;
   std::vector<RegisterValue> all{
       {kSlaveconf, kSendDelay, false},
       {kChopconf, chopconfOf(settings, microsteps, false), true},
       {kVactual, 0, false},
-      {kGconf, gconf, true},
+      {kGconf, gconfOf(settings), true},
       {kIholdIrun, currentsOf(settings.current), false},
-      {kTpowerdown, powerDownOf(settings.hold_delay), false},
-      {kTpwmthrs, thresholdOf(settings.spread_cycle_above), false},
+      {kTpowerdown, powerDownOf(settings.hold_delay, settings.model), false},
+      {kTpwmthrs, thresholdOf(settings.spread_cycle_above, settings.model), false},
       {kPwmconf, kPwmconfValue, true},
   };
   if (settings.model == Model::kTmc2209) {
-    all.push_back({kTcoolthrs, 0, false});
-    all.push_back({kSgthrs, 0, false});
+    const auto threshold = static_cast<std::uint32_t>(settings.stall_threshold);
+    all.push_back({kTcoolthrs, thresholdOf(settings.stall_above, settings.model), false});
+    all.push_back({kSgthrs, threshold, false});
     all.push_back({kCoolconf, 0, false});
   }
   all.push_back({kChopconf, chopconfOf(settings, microsteps, true), true});

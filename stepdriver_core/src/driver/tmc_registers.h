@@ -20,6 +20,7 @@ enum Register : std::uint8_t {
   kGlobalScaler = 0x0B,  ///< of a TMC5160
   kIholdIrun = 0x10,
   kTpowerdown = 0x11,
+  kTstep = 0x12,
   kTpwmthrs = 0x13,
   kTcoolthrs = 0x14,
   kVactual = 0x22,
@@ -43,6 +44,8 @@ enum class Model {
 
 /// Of a driver with registers, by DriverChip::name.
 Model modelOf(const std::string& chip);
+/// [Hz] Its own clock, typically: it counts all times with it.
+double clockOf(Model model);
 constexpr bool isOnSpi(Model model) { return model == Model::kTmc2130 || model == Model::kTmc5160; }
 /// The number of IOIN, and the version in its highest byte.
 constexpr std::uint8_t ioinOf(Model model) { return isOnSpi(model) ? kIoinOnSpi : kIoin; }
@@ -127,17 +130,17 @@ CurrentScale scaleOf(double run, double hold, const Board& board);
 double lowestHold(double run, const Board& board);
 
 /// [s] The longest delay until the current is lowered at rest.
-double longestHoldDelay();
+double longestHoldDelay(Model model);
 /// TPOWERDOWN of a delay [s].
-std::uint32_t powerDownOf(double delay);
+std::uint32_t powerDownOf(double delay, Model model);
 
 /// @name Thresholds of speed, which the chip compares with the time of a step of 1/256
 /// @{
 /// [full steps/s] The lowest and the highest speed that a threshold can have.
-double lowestThreshold();
-double highestThreshold();
+double lowestThreshold(Model model);
+double highestThreshold(Model model);
 /// TPWMTHRS or TCOOLTHRS of a speed [full steps/s] between these; 0 of 0: there is none.
-std::uint32_t thresholdOf(double speed);
+std::uint32_t thresholdOf(double speed, Model model);
 /// @}
 
 /// What the registers are to say.
@@ -149,12 +152,17 @@ struct Settings {
   double spread_cycle_above = 0.0;  ///< [full steps/s] 0: at no speed
   bool interpolate = true;
   bool both_edges = false;
+  int stall_threshold = 0;   ///< SGTHRS, for stalls in any motion
+  double stall_above = 0.0;  ///< [full steps/s] 0: at no speed
 };
 
 /// IHOLD_IRUN of these currents.
 std::uint32_t currentsOf(const CurrentScale& current);
 /// CHOPCONF in a microstep mode. @param on false: the outputs are off. @pre mresOf() has it
 std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on);
+
+/// GCONF: VREF doesn't scale the current.
+std::uint32_t gconfOf(const Settings& settings);
 
 /// A register and its value.
 struct RegisterValue {

@@ -187,6 +187,10 @@ void Controller::update(axis::AxisModel& axis, const pulse::ChannelState& state)
                     axis.chipAt(state.chip_at_fault).fault_name),
         kChipRemedy);
     axis.distrust();
+    if (motor::TmcChip* chip = axis.motor.tmcAt(state.chip_at_fault)) {
+      chip->asks_for_cause = true;
+      chip->next_poll = context_.now;
+    }
   }
   if (state.ended != before.ended) {
     axis.rest_since = std::min(context_.now, state.end_time + context_.slipped);
@@ -374,6 +378,7 @@ void Controller::superviseChips(axis::AxisModel& axis) {
     if (!rests) chip->resting_count.reset();
     endStall(axis, *chip);
     sampleLoad(axis, *chip);
+    superviseIdleCurrent(axis, *chip);
     if (context_.now < pollDue(*chip)) continue;
     const bool audits = rests && context_.now >= chip->next_audit;
     if (audits) chip->resting_count = axis.motor.countOf(i);
@@ -391,15 +396,27 @@ void Controller::sampleLoad(const axis::AxisModel& axis, motor::TmcChip& chip) {
   context_.out->register_jobs.push_back(std::move(job));
 }
 
-void Controller::takeSample(axis::AxisModel& axis, motor::TmcChip& chip,
+void Controller::takeSample(axis::AxisModel& axis, std::size_t motor,
                             const bus::RegisterDone& done) {
+  motor::TmcChip& chip = *axis.motor.tmcAt(motor);
   const pulse::Nanoseconds took = context_.now - chip.sampled_since;
   chip.next_sample = context_.now + std::max(kSamplePeriod, kPauseAfterSample * took);
   const motion::MotionState planned = axis.motor.stateAt(context_.motionNow());
   const auto slack = static_cast<double>(axis.motor.state().slack);
-  chip.takeSample(done, axis.positionOf(planned.position.value() - slack),
-                  planned.velocity / axis.stepsPerUnit());
+  const std::string fault = chip.takeSample(done, axis.positionOf(planned.position.value() - slack),
+                                            planned.velocity / axis.stepsPerUnit());
   axis.motor.noteChips();
+  if (!fault.empty() && axis.moving()) failChip(axis, motor, fault);
+}
+
+// After a change of the current that is under way: it was made without this one.
+void Controller::superviseIdleCurrent(const axis::AxisModel& axis, motor::TmcChip& chip) {
+  const bool idle = axis.motor.power().isIdle() && chip.config().idle_current;
+  if (idle == chip.isIdle() || chip.setting_idle != 0 || !answers(chip)) return;
+  if (chip.isPreparedForStall() || !requests_.current_changes.empty()) return;
+  bus::RegisterJob job = chip.setIdle(idle);
+  job.id = chip.setting_idle = context_.newJob();
+  context_.out->register_jobs.push_back(std::move(job));
 }
 
 // Whatever has ended a homing to a stall: its registers are for nothing else.
@@ -422,9 +439,10 @@ void Controller::on(const bus::RegisterDone& done) {
       motor::TmcChip* chip = axis->motor.tmcAt(i);
       if (chip == nullptr) continue;
       if (chip->polling == done.id) return takePoll(*axis, i, done);
-      if (chip->sampling == done.id) return takeSample(*axis, *chip, done);
-      if (chip->ending_stall != done.id) continue;
-      const std::string why = chip->takeEndOfStall(done);
+      if (chip->sampling == done.id) return takeSample(*axis, i, done);
+      const bool sets_idle = chip->setting_idle == done.id;
+      if (!sets_idle && chip->ending_stall != done.id) continue;
+      const std::string why = sets_idle ? chip->takeIdle(done) : chip->takeEndOfStall(done);
       axis->motor.noteChips();
       if (!why.empty()) failChip(*axis, i, why);
       return;
@@ -440,6 +458,7 @@ void Controller::takePoll(axis::AxisModel& axis, std::size_t motor, const bus::R
   if (!chip.isSetUp() || !context_.mode.powered) return;
   std::string fault = chip.takePoll(done);
   axis.motor.noteChips();
+  if (std::exchange(chip.asks_for_cause, false)) nameCause(axis, motor, fault);
   // Without a change meanwhile: of its mode, or by a step that was still on its way.
   const auto count = std::exchange(chip.resting_count, {});
   if (fault.empty() && count == axis.motor.countOf(motor)) {
@@ -447,6 +466,14 @@ void Controller::takePoll(axis::AxisModel& axis, std::size_t motor, const bus::R
     fault = chip.audited(*count, axis.motor.microsteps());
   }
   if (!fault.empty()) failChip(axis, motor, fault);
+}
+
+// The fault output says that something is wrong; the registers say what.
+void Controller::nameCause(axis::AxisModel& axis, std::size_t motor, std::string fault) {
+  motor::TmcChip& chip = *axis.motor.tmcAt(motor);
+  if (axis.fault.remedy() != kChipRemedy) return;
+  if (fault.empty()) fault = chip.stallFault();
+  if (!fault.empty()) axis.fault.latch(axis.chipText(motor) + " " + fault, chip.remedy());
 }
 
 void Controller::takeCurrent(const RequestContext::CurrentChange& change,

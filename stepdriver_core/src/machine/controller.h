@@ -80,7 +80,9 @@ class Controller {
   /// The same for its load in motion.
   pulse::Nanoseconds sampleDue(const axis::AxisModel& axis, const motor::TmcChip& chip) const;
   void sampleLoad(const axis::AxisModel& axis, motor::TmcChip& chip);
-  void takeSample(axis::AxisModel& axis, motor::TmcChip& chip, const bus::RegisterDone& done);
+  void takeSample(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done);
+  void superviseIdleCurrent(const axis::AxisModel& axis, motor::TmcChip& chip);
+  void nameCause(axis::AxisModel& axis, std::size_t motor, std::string fault);
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
   AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;
 

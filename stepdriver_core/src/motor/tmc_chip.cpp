@@ -13,6 +13,8 @@ using Kind = bus::RegisterAccess::Kind;
 
 constexpr std::uint32_t kVersionMask = 0xFF000000U;
 constexpr unsigned kVersionShift = 24;
+// Without DIAG, so many samples in a row are a stall: a damaged one may be believed once.
+constexpr int kStalledSamples = 2;
 constexpr const char* kWireRemedy =
     "check the chip's motor supply, its address and the wire to PDN_UART, then call recover";
 constexpr const char* kSpiRemedy =
@@ -29,6 +31,9 @@ constexpr const char* kShortRemedy =
 constexpr const char* kAuditRemedy =
     "check the wires to STEP and DIR and their ground, then call recover, and home the axis or set "
     "its position";
+constexpr const char* kStallRemedy =
+    "check what blocks the motor, and that its current and tmc/stall_fault_threshold suit its "
+    "speed, then call recover, and home the axis or set its position";
 constexpr const char* kSupplyRemedy = "check the motor supply, then call recover";
 
 tmc::Settings settingsOf(const config::MotorConfig& motor) {
@@ -42,6 +47,10 @@ tmc::Settings settingsOf(const config::MotorConfig& motor) {
   settings.spread_cycle_above = config.spread_cycle_above;
   settings.interpolate = config.interpolate;
   settings.both_edges = motor.driver.both_edges;
+  if (config.stall_fault) {
+    settings.stall_threshold = config.stall_fault->threshold;
+    settings.stall_above = config.stall_fault->above;
+  }
   return settings;
 }
 
@@ -54,8 +63,17 @@ TmcChip::TmcChip(const config::MotorConfig& motor) : motor_(motor), settings_(se
 }
 
 void TmcChip::noteCurrents() {
-  state_.run_current = currentOf(settings_.current.run);
-  state_.hold_current = currentOf(settings_.current.hold);
+  const tmc::CurrentScale scale = inForce(settings_.current);
+  state_.run_current = currentOf(scale.run);
+  state_.hold_current = currentOf(scale.hold);
+}
+
+tmc::CurrentScale TmcChip::inForce(tmc::CurrentScale scale) const {
+  if (is_idle_) {
+    scale.hold =
+        std::min(scale.hold, tmc::scaleBelow(*config().idle_current, scale.range, board()));
+  }
+  return scale;
 }
 
 double TmcChip::currentOf(int scale) const {
@@ -78,7 +96,9 @@ bus::RegisterAccess TmcChip::read(std::uint8_t number, std::uint32_t volatile_bi
 
 bus::RegisterJob TmcChip::setUp(int microsteps, const std::vector<int>& port_addresses) const {
   const auto address = static_cast<std::uint8_t>(config().address);
-  const std::vector<tmc::RegisterValue> values = tmc::setUpOf(settings_, microsteps);
+  tmc::Settings settings = settings_;
+  settings.current = inForce(settings.current);
+  const std::vector<tmc::RegisterValue> values = tmc::setUpOf(settings, microsteps);
   Accesses all;
   // An answer that comes too soon is a frame to the other chips, which then don't hear the next.
   for (const int other : tmc::isOnSpi(settings_.model) ? std::vector<int>() : port_addresses) {
@@ -117,8 +137,9 @@ bus::RegisterAccess TmcChip::readFlags() const {
 
 bus::RegisterJob TmcChip::poll(bool audits) const {
   Accesses all{readFlags(), read(tmc::kDrvStatus, tmc::volatileStatusOf(settings_.model))};
-  // No damaged answer hides or makes up a reset: a chip that has forgotten its mode isn't set up.
-  if (tmc::isOnSpi(settings_.model)) all.push_back(read(tmc::kChopconf));
+  // On SPI no damaged answer hides or makes up a reset: a chip that has forgotten its mode isn't
+  // set up. On a UART another master, or noise, may have put VREF in charge of the current.
+  all.push_back(read(tmc::isOnSpi(settings_.model) ? tmc::kChopconf : tmc::kGconf));
   if (audits) all.push_back(read(tmc::kMscnt));
   return jobOf(std::move(all));
 }
@@ -129,8 +150,12 @@ tmc::CurrentScale TmcChip::scaleOf(double run, double hold) const {
 }
 
 bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) const {
-  return jobOf({{Kind::kWrite, static_cast<std::uint8_t>(config().address), tmc::kIholdIrun,
-                 tmc::currentsOf(scale), 0}});
+  return jobOf({write(tmc::kIholdIrun, tmc::currentsOf(inForce(scale)))});
+}
+
+bus::RegisterJob TmcChip::setIdle(bool idle) {
+  is_idle_ = idle;
+  return setCurrent(settings_.current);
 }
 
 bus::RegisterAccess TmcChip::write(std::uint8_t number, std::uint32_t value) const {
@@ -151,7 +176,7 @@ bus::RegisterJob TmcChip::prepareStall() const {
 // A threshold is good for speeds from 80 % on of the one that it was found at.
 bus::RegisterJob TmcChip::armStall(double speed) const {
   constexpr double kSlowest = 0.8;
-  return jobOf({write(tmc::kTcoolthrs, tmc::thresholdOf(kSlowest * speed))});
+  return jobOf({write(tmc::kTcoolthrs, tmc::thresholdOf(kSlowest * speed, settings_.model))});
 }
 
 bus::RegisterAccess TmcChip::sample(std::uint8_t number) const {
@@ -163,7 +188,7 @@ bus::RegisterAccess TmcChip::sample(std::uint8_t number) const {
 bus::RegisterJob TmcChip::readLoad() const { return jobOf({sample(tmc::kSgResult)}); }
 
 bus::RegisterJob TmcChip::sampleLoad() const {
-  return jobOf({sample(tmc::kSgResult), sample(tmc::kDrvStatus)});
+  return jobOf({sample(tmc::kSgResult), sample(tmc::kTstep), sample(tmc::kDrvStatus)});
 }
 
 bus::RegisterJob TmcChip::disarmStall() const {
@@ -171,9 +196,12 @@ bus::RegisterJob TmcChip::disarmStall() const {
 }
 
 bus::RegisterJob TmcChip::endStall() const {
-  return jobOf({write(tmc::kTcoolthrs, 0), write(tmc::kSgthrs, 0),
-                write(tmc::kTpwmthrs, tmc::thresholdOf(settings_.spread_cycle_above)),
-                write(tmc::kIholdIrun, tmc::currentsOf(settings_.current))});
+  const auto threshold = [this](double speed) { return tmc::thresholdOf(speed, settings_.model); };
+  return jobOf({write(tmc::kTcoolthrs, 0),
+                write(tmc::kSgthrs, static_cast<std::uint32_t>(settings_.stall_threshold)),
+                write(tmc::kTpwmthrs, threshold(settings_.spread_cycle_above)),
+                write(tmc::kIholdIrun, tmc::currentsOf(inForce(settings_.current))),
+                write(tmc::kTcoolthrs, threshold(settings_.stall_above))});
 }
 
 std::string TmcChip::takeStall(const bus::RegisterDone& done) {
@@ -251,18 +279,54 @@ std::string TmcChip::takePoll(const bus::RegisterDone& done) {
   if (tmc::isOnSpi(settings_.model) && done.values.at(2) != chopconf_) flags |= tmc::kGstatReset;
   takeStatus(status);
   mscnt_ = static_cast<int>(done.values.back());  // if it was asked for
-  return faultOf(flags, status);
+  std::string fault = faultOf(flags, status);
+  const bool is_changed =
+      !tmc::isOnSpi(settings_.model) && done.values.at(2) != tmc::gconfOf(settings_);
+  if (!fault.empty() || !is_changed) return fault;
+  state_.is_set_up = false;
+  remedy_ = kWireRemedy;
+  return fmt::format(
+      "has {:X}h in its register GCONF, but {:X}h was written: another master writes as well, or "
+      "the "
+      "wire picks up noise{}",
+      done.values.at(2), tmc::gconfOf(settings_),
+      (done.values.at(2) & tmc::kGconfScaleByVref) != 0 ? "; VREF sets its current now" : "");
 }
 
-void TmcChip::takeSample(const bus::RegisterDone& done, double position, double velocity) {
+std::string TmcChip::takeSample(const bus::RegisterDone& done, double position, double velocity) {
   sampling = 0;
   count(done);
-  if (done.failure != bus::Failure::kNone) return;
+  if (done.failure != bus::Failure::kNone) return "";
   const tmc::Status status = tmc::statusOf(settings_.model, done.values.back());
-  if (status.standstill || !status.stealth_chop.value_or(false)) return;
+  stalled_samples_ = isStalled(done, status) ? stalled_samples_ + 1 : 0;
+  if (status.standstill || !status.stealth_chop.value_or(false)) return "";
   state_.stall_guard = static_cast<int>(done.values.front());
   state_.stall_guard_position = position;
   state_.stall_guard_velocity = velocity;
+  return stalled_samples_ < kStalledSamples ? "" : stallFault();
+}
+
+// With DIAG the chip says it itself.
+bool TmcChip::isStalled(const bus::RegisterDone& done, const tmc::Status& status) const {
+  if (!config().stall_fault || motor_.fault) return false;
+  const bool is_fast =
+      done.values.at(1) <= tmc::thresholdOf(settings_.stall_above, settings_.model);
+  return is_fast && !status.standstill && status.stealth_chop.value_or(false) &&
+         done.values.front() <= 2U * static_cast<std::uint32_t>(settings_.stall_threshold);
+}
+
+std::string TmcChip::stallFault() {
+  if (!config().stall_fault) return "";
+  stalled_samples_ = 0;
+  remedy_ = kStallRemedy;
+  return "reports that the motor has stalled";
+}
+
+std::string TmcChip::takeIdle(const bus::RegisterDone& done) {
+  setting_idle = 0;
+  count(done);
+  noteCurrents();
+  return done.failure == bus::Failure::kNone ? "" : failureText(done);
 }
 
 std::string TmcChip::takeCurrent(const tmc::CurrentScale& scale, const bus::RegisterDone& done) {

@@ -43,6 +43,11 @@ class TmcChip {
   double lowestCurrent() const { return currentOf(0); }
   /// Other currents.
   bus::RegisterJob setCurrent(const driver::tmc::CurrentScale& scale) const;
+  /// At rest the current of the idle timeout, or again as before. @pre config().idle_current
+  bus::RegisterJob setIdle(bool idle);
+  /// setIdle(true) was the last one.
+  bool isIdle() const { return is_idle_; }
+  std::uint64_t setting_idle = 0;  ///< the job of setIdle() under way; 0: none
 
   /// @name A homing to a stall. @pre config().stall
   /// @{
@@ -75,7 +80,13 @@ class TmcChip {
   std::string takePoll(const bus::RegisterDone& done);
   /// Takes the answers to sampleLoad(), when the axis had this position [unit] and velocity
   /// [unit/s]. If there is none, the next poll says why.
-  void takeSample(const bus::RegisterDone& done, double position, double velocity);
+  /// @return a fault, as takePoll(): the motor has stalled.
+  std::string takeSample(const bus::RegisterDone& done, double position, double velocity);
+  /// The fault output was active in a motion, and a poll has found nothing that explains it but a
+  /// stall. @return the fault, as takePoll(); empty: it isn't configured.
+  std::string stallFault();
+  /// Takes the answer to setIdle(). @return why it failed; empty if it didn't.
+  std::string takeIdle(const bus::RegisterDone& done);
   /// Takes the answer to setCurrent(), which also counts for a later setUp(). @return why the
   ///   currents aren't changed; empty if they are.
   std::string takeCurrent(const driver::tmc::CurrentScale& scale, const bus::RegisterDone& done);
@@ -106,6 +117,8 @@ class TmcChip {
   std::uint64_t polling = 0;  ///< its job; 0: none
   /// The count of the motor, if MSCNT is asked for and the motor has been at rest since.
   std::optional<std::int64_t> resting_count;
+  /// Its fault output was active: the poll says why.
+  bool asks_for_cause = false;
   pulse::Nanoseconds next_poll = 0;
   pulse::Nanoseconds next_audit = 0;
   /// @}
@@ -131,6 +144,9 @@ class TmcChip {
   driver::tmc::Board board() const;
   std::string place() const;  // "on /dev/serial0 at address 1"
   void noteCurrents();
+  /// With the hold current of the idle timeout, if that is over.
+  driver::tmc::CurrentScale inForce(driver::tmc::CurrentScale scale) const;
+  bool isStalled(const bus::RegisterDone& done, const driver::tmc::Status& status) const;
   double currentOf(int scale) const;  // [A rms]
   /// What of these flags stops the motor.
   std::string faultOf(std::uint32_t gstat, const driver::tmc::Status& status);
@@ -140,6 +156,8 @@ class TmcChip {
   driver::DriverState state_;
   std::string remedy_;
   bool prepared_for_stall_ = false;
+  bool is_idle_ = false;
+  int stalled_samples_ = 0;     // in a row
   std::uint32_t chopconf_ = 0;  // as it was read back
   int mscnt_ = 0;
   bool stands_still_ = false;

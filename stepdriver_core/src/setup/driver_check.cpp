@@ -73,6 +73,7 @@ class DriverCheck {
   std::vector<DriverFinding> run(bool wiring) {
     bool all_answer = !chips_.empty();
     for (const Chip& chip : chips_) all_answer = ask(chip, wiring) && all_answer;
+    tellSlowPorts();
     if (!wiring || chips_.empty()) return findings_;
     if (all_answer) {
       testLines();
@@ -136,6 +137,24 @@ class DriverCheck {
     if (done.failure == bus::Failure::kOnlyEcho) text += others(config);
     say(false, text);
     return false;
+  }
+
+  /// A port that takes longer than the node's period of asking makes faults known later.
+  void tellSlowPorts() {
+    // Three registers, each read twice: 4 bytes and 8, of 10 bits each, and the chip's delay of 24
+    // bits before its answer.
+    constexpr double kBits = 6.0 * (12.0 * 10.0 + 24.0);
+    constexpr double kPeriod = 0.25;  // [s] of asking each chip
+    for (const auto& [port, addresses] : addresses_) {
+      const auto uses = [&port = port](const Chip& chip) { return chip.motor->tmc->port == port; };
+      const int baud = std::find_if(chips_.begin(), chips_.end(), uses)->motor->tmc->baud;
+      if (baud == 0) continue;
+      const double time = kBits * static_cast<double>(addresses.size()) / baud;
+      if (time <= kPeriod) continue;
+      say(true, fmt::format("{}: at {} baud, asking its {} drivers how they are takes {:.2g} s: "
+                            "their faults are known by that much later than at 115200",
+                            port, baud, addresses.size(), time));
+    }
   }
 
   /// The addresses at which chips answer that aren't configured.

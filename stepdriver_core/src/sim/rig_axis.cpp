@@ -417,14 +417,13 @@ void RigAxis::measureLoad(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   const bool stalls = tmc_->measure(lag, tstep());
   if (!fault_ || chip_fault_) return;
   if (!stalls) return fault_->stick({});
-  constexpr double kNsPerClock = 1e3 / 12.0;
-  const double slow = kNsPerClock * tmc_->slowestStall() * kFinestMode / chip_.microsteps();
+  const double slow = 1e9 / tmc_->clock() * tmc_->slowestStall() * kFinestMode / chip_.microsteps();
   fault_->stick(true, time_ns + std::llround(slow));
 }
 
 std::uint32_t RigAxis::tstep() const {
-  constexpr double kClocksPerNs = 12e-3;
-  const double clocks = kClocksPerNs * static_cast<double>(step_interval_ns_) * chip_.microsteps();
+  const double clocks =
+      tmc_->clock() * 1e-9 * static_cast<double>(step_interval_ns_) * chip_.microsteps();
   return static_cast<std::uint32_t>(std::min(clocks / kFinestMode, double{0xFFFFF}));
 }
 

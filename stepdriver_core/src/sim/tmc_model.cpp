@@ -76,6 +76,8 @@ ChipModel::Configured TmcModel::configured() const {
   return {microsteps(), outputsOn(), (registers_[kChopconf] & 1U << 29U) != 0};
 }
 
+double TmcModel::clock() const { return spec_.version == kVersion2130 ? 13.2e6 : 12e6; }
+
 double TmcModel::torque() const {
   return first_run_ == 0 ? 1.0 : static_cast<double>(runOf()) / static_cast<double>(first_run_);
 }

@@ -22,7 +22,7 @@ class TmcModel {
     bool diag = false;
     int mscnt = 0;
     bool standstill = true;
-    /// TSTEP: clocks of 12 MHz for 1/256 of a full step, by the last two steps.
+    /// TSTEP: clocks for 1/256 of a full step, by the last two steps.
     std::uint32_t tstep = 0xFFFFF;
     bool outputs_failed = false;  ///< a short or over-temperature has switched them off
   };
@@ -44,6 +44,8 @@ class TmcModel {
   /// @{
   ChipModel::Configured configured() const;
   bool outputsOn() const;
+  /// [Hz] With which it counts times.
+  double clock() const;
   /// The torque, as a part of that of the first run current that was written: the motor was chosen
   /// for that.
   double torque() const;

@@ -107,6 +107,67 @@ TEST(ReadTmc, TakesTheSpeedAboveWhichItChopsAudibly) {
                                      "/axes/x/tmc/spreadcycle_above_mm_s"));
 }
 
+TEST(ReadTmc, TakesStallsInAnyMotionAsAFault) {
+  ConfigValue axis = tmcAxis();
+  EXPECT_FALSE(readX(axis).tmc->stall_fault);
+  put(axis, "tmc/stall_fault_threshold", 60);
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/stall_fault_threshold",
+                                     "is 60, but /axes/x/tmc/stall_fault_above_mm_s is missing"));
+  put(axis, "tmc/stall_fault_above_mm_s", 20.0);
+  ASSERT_TRUE(readX(axis).tmc->stall_fault);
+  EXPECT_EQ(readX(axis).tmc->stall_fault->threshold, 60);
+  EXPECT_DOUBLE_EQ(readX(axis).tmc->stall_fault->above, 100.0);
+  expectIssues(axis, {{"tmc/stall_fault_threshold", 256, "is 256, but must be from 0 to 255"},
+                      {"tmc/stall_fault_above_mm_s", 0.001,
+                       "is 0.001, but must be from 0.00894071 to 9375: the chip compares no other "
+                       "speeds with this travel of a step"},
+                      {"tmc/stall_fault_above_mm_s", 100.1,
+                       "is 100.1, but must be below the axis's highest speed: a stall would never "
+                       "be detected"}});
+  put(axis, "tmc/spreadcycle_above_mm_s", 20.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("tmc/stall_fault_above_mm_s",
+                    "is 20.0, but must be below /axes/x/tmc/spreadcycle_above_mm_s: the chip "
+                    "detects stalls in stealthchop only"));
+  drop(axis, "tmc/spreadcycle_above_mm_s");
+  drop(axis, "tmc/stall_fault_threshold");
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/stall_fault_above_mm_s",
+                                     "is 20.0, but /axes/x/tmc/stall_fault_threshold is missing"));
+  put(axis, "tmc/stall_fault_threshold", 60);
+  put(axis, "tmc/mode", std::string("spreadcycle"));
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/stall_fault_threshold",
+                                     "is 60, but the chip detects stalls in stealthchop only"));
+  drop(axis, "tmc/mode");
+  put(axis, "driver", std::string("tmc2208"));
+  put(axis, "tmc/address", 0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("tmc/stall_fault_threshold", "is 60, but is only for the TMC2209 and TMC2226"));
+}
+
+TEST(ReadTmc, TakesALowerCurrentForTheIdleTimeout) {
+  ConfigValue axis = tmcAxis();
+  put(axis, "idle_timeout_s", 2.0);
+  put(axis, "idle_action", std::string("lower_current"));
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("idle_action", "is lower_current, but /axes/x/tmc/idle_current_a is missing"));
+  put(axis, "tmc/idle_current_a", 0.1);
+  EXPECT_EQ(readX(axis).idle_action, IdleAction::kLowerCurrent);
+  EXPECT_DOUBLE_EQ(readX(axis).tmc->idle_current.value(), 0.1);
+  expectIssues(axis,
+               {{"tmc/idle_current_a", 0.01,
+                 "is 0.01, but must be from 0.030596 to 0.4: with a sense resistor of 110.0 mOhm "
+                 "the board makes no other current; read the value off the board"},
+                {"tmc/idle_current_a", 0.5,
+                 "is 0.5, but must be from 0.030596 to 0.4: with a sense resistor of 110.0 mOhm "
+                 "the board makes no other current; read the value off the board"}});
+  put(axis, "idle_action", std::string("disable"));
+  put(axis, "idle_timeout_s", 0.0);
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("idle_action",
+                    "is disable, but /axes/x/tmc/idle_current_a is given, which is "
+                    "only for lower_current"));
+}
+
 TEST(ReadTmc, EndsMotionsAtAFaultAsItIsTold) {
   ConfigValue axis = tmcAxis();
   EXPECT_FALSE(readX(axis).fault_ramps);

@@ -154,9 +154,38 @@ TEST(TmcRegisters, TellTheirStatusAtThePlacesOfEachModel) {
 }
 
 TEST(TmcRegisters, DelayTheHoldCurrentByUnitsOf22Milliseconds) {
-  EXPECT_EQ(powerDownOf(0.0), 2U);
-  EXPECT_EQ(powerDownOf(0.437), 20U);
-  EXPECT_EQ(powerDownOf(longestHoldDelay()), 255U);
+  EXPECT_EQ(powerDownOf(0.0, Model::kTmc2209), 2U);
+  EXPECT_EQ(powerDownOf(0.437, Model::kTmc2209), 20U);
+  for (const Model model : {Model::kTmc2209, Model::kTmc2130}) {
+    EXPECT_EQ(powerDownOf(longestHoldDelay(model), model), 255U);
+  }
+  EXPECT_NEAR(longestHoldDelay(Model::kTmc2209), 5.571, 1e-3);
+  EXPECT_NEAR(longestHoldDelay(Model::kTmc2130), 5.064, 1e-3);
+}
+
+// The TMC2130 has a faster clock, so the same speed is more of its clocks.
+TEST(TmcRegisters, CompareSpeedsByTheClockOfEachModel) {
+  EXPECT_EQ(thresholdOf(100.0, Model::kTmc2209), 469U);
+  EXPECT_EQ(thresholdOf(100.0, Model::kTmc5160), 469U);
+  EXPECT_EQ(thresholdOf(100.0, Model::kTmc2130), 516U);
+  EXPECT_EQ(thresholdOf(0.0, Model::kTmc2209), 0U);
+}
+
+TEST(TmcRegisters, DetectStallsInAnyMotionAboveASpeed) {
+  Settings settings;
+  const auto written = [&settings](std::uint8_t number) {
+    std::uint32_t value = 0;
+    for (const RegisterValue& one : setUpOf(settings, 16)) {
+      if (one.number == number) value = one.value;
+    }
+    return value;
+  };
+  EXPECT_EQ(written(kTcoolthrs), 0U);
+  EXPECT_EQ(written(kSgthrs), 0U);
+  settings.stall_threshold = 60;
+  settings.stall_above = 100.0;
+  EXPECT_EQ(written(kTcoolthrs), 469U);
+  EXPECT_EQ(written(kSgthrs), 60U);
 }
 
 }  // namespace

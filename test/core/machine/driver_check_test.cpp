@@ -29,6 +29,7 @@ class DriverCheckTest : public testing::Test {
     count_ = 0;
     for (const setup::DriverFinding& finding : setup::checkDrivers(axes_, backend, wiring)) {
       ++count_;
+      last_ = finding.text;
       if (!finding.is_right) wrong += finding.text + "\n";
     }
     for (const sim::RigAxisSpec& spec : specs) {
@@ -39,6 +40,7 @@ class DriverCheckTest : public testing::Test {
 
   std::vector<config::AxisConfig> axes_{tmcAxis("x", 0), tmcAxis("y", 1)};
   int count_ = 0;
+  std::string last_;
 };
 
 TEST_F(DriverCheckTest, FindsNothingWrongIfAllIsRight) {
@@ -52,6 +54,17 @@ TEST_F(DriverCheckTest, FindsNothingWrongIfAllIsRight) {
   EXPECT_EQ(check(), "");
   EXPECT_EQ(check({}, false), "");
   EXPECT_EQ(count_, 2);
+}
+
+TEST_F(DriverCheckTest, TellsHowSlowAPortIs) {
+  for (const int baud : {9600, 19'200, 115'200}) {
+    axes_ = {tmcAxis("x", 0), tmcAxis("y", 1), tmcAxis("z", 2), tmcAxis("a", 3)};
+    for (config::AxisConfig& axis : axes_) axis.tmc->baud = baud;
+    EXPECT_EQ(check({}, false), "");
+    EXPECT_EQ(last_.find("asking its 4 drivers how they are takes 0.36 s") != std::string::npos,
+              baud == 9600)
+        << last_;
+  }
 }
 
 TEST_F(DriverCheckTest, FindsStepAndDirSwapped) {
@@ -87,8 +100,8 @@ TEST_F(DriverCheckTest, FindsBrokenInvertedAndTouchingWires) {
 TEST_F(DriverCheckTest, FindsAWrongAddressAndAnotherChip) {
   EXPECT_EQ(check([](auto& rig) { rig[0].tmc->address = 3; }, false),
             "x: the TMC2209 on /dev/serial0 at address 0, no chip answers: it has no motor supply, "
-            "or another address (MS1, MS2), or PDN_UART isn't connected; but a chip answers at "
-            "address 3\n");
+            "or another address (MS1, MS2), or PDN_UART isn't connected, or it can't measure this "
+            "baud rate; but a chip answers at address 3\n");
   const std::string other = check([](auto& rig) { rig[0].tmc->version = 0x20; });
   EXPECT_NE(other.find("says that it is a TMC2208"), std::string::npos) << other;
   EXPECT_NE(other.find("the lines weren't tested"), std::string::npos) << other;

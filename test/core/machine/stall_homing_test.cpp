@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <random>
 #include <string>
@@ -101,9 +102,14 @@ TEST_P(StallHoming, EndsWhereTheMotorIsBlocked) {
   EXPECT_FALSE(contains(result.message, "before")) << result.message;
 }
 
-// A hundred of them, from everywhere, at loads of up to 40 % of the torque.
+/// Of five loads, by DIAG or by the UART: STEPDRIVER_STALL_HOMINGS is how many altogether.
+int homingsOfEach() {
+  const char* const wanted = std::getenv("STEPDRIVER_STALL_HOMINGS");
+  return wanted == nullptr ? 20 : std::max(1, std::atoi(wanted) / 10);
+}
+
+// Two hundred of them, from everywhere, at loads of up to 40 % of the torque.
 TEST_P(StallHoming, FindsTheSameMicrostepEachTimeByThePhase) {
-  constexpr int kEach = 20;  // of five loads, by DIAG or by the UART
   config::AxisConfig config = stallAxis(GetParam());
   config.tmc->stall->phase = kWallPhase;
   std::mt19937 random(3);
@@ -111,7 +117,7 @@ TEST_P(StallHoming, FindsTheSameMicrostepEachTimeByThePhase) {
   double most = -1e9;
   for (const double friction : {0.0, 0.1, 0.2, 0.3, 0.4}) {
     WithWall machine(config, friction);
-    for (int i = 0; i < kEach; ++i) {
+    for (int i = 0; i < homingsOfEach(); ++i) {
       const HomingResult result = machine.x().home();
       ASSERT_EQ(result.end, HomingEnd::kHomed) << friction << ": " << result.message;
       machine.bench.machine->advance(0.3);
@@ -120,6 +126,8 @@ TEST_P(StallHoming, FindsTheSameMicrostepEachTimeByThePhase) {
       machine.x().wait(machine.x().moveTo(-0.03 + 1e-4 * static_cast<double>(random() % 500)));
     }
   }
+  RecordProperty("least_microsteps", std::to_string(least));
+  RecordProperty("most_microsteps", std::to_string(most));
   EXPECT_LE(most - least, 1.0) << "from " << least << " to " << most << " microsteps";
   EXPECT_LT(std::abs(most), 64.0);
 }
@@ -197,6 +205,88 @@ TEST_P(StallHoming, FailsIfTheChipIsLost) {
   EXPECT_EQ(result.end, HomingEnd::kFailed);
   machine.bench.machine->advance(1.5);
   EXPECT_TRUE(contains(machine.x().state().fault, "no chip answers")) << machine.x().state().fault;
+}
+
+// A machine that meets something in a move, by DIAG or by the UART.
+class StallFault : public ::testing::TestWithParam<bool> {
+ protected:
+  static config::AxisConfig axis() {
+    config::AxisConfig config = stallAxis(GetParam());
+    config.tmc->stall_fault.emplace();
+    config.tmc->stall_fault->threshold = 60;
+    config.tmc->stall_fault->above = 150.0;  // 0.03 m/s
+    return config;
+  }
+};
+
+TEST_P(StallFault, EndsTheMotionWithItsCause) {
+  WithWall machine(axis(), 0.2);
+  axis::Axis& x = machine.x();
+  x.setPosition(0.0);
+  const axis::Move move = x.moveTo(-0.09, false, 0.05);
+  const double until_the_wall = 1.05;
+  machine.bench.machine->advance(until_the_wall);
+  EXPECT_EQ(x.state().fault, "");
+  double waited = 0.0;
+  for (; x.state().moving && waited < 1.5; waited += 0.01) machine.bench.machine->advance(0.01);
+  EXPECT_LT(waited, 0.3);
+  EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kFault);
+  machine.bench.machine->advance(0.1);
+  EXPECT_TRUE(contains(x.state().fault, "the TMC2209 reports that the motor has stalled"))
+      << x.state().fault;
+  EXPECT_TRUE(contains(x.state().remedy, "what blocks the motor")) << x.state().remedy;
+  EXPECT_FALSE(x.state().position_valid);
+  machine.bench.machine->recover();
+  EXPECT_EQ(x.state().fault, "");
+  x.wait(x.moveTo(0.01, true));
+  EXPECT_EQ(x.state().fault, "");
+}
+
+TEST_P(StallFault, IsOnlyAboveItsSpeed) {
+  WithWall machine(axis(), 0.2);
+  machine.x().setPosition(0.0);
+  const axis::Move move = machine.x().moveTo(-0.06, false, 0.025);
+  EXPECT_EQ(machine.x().wait(move).end, axis::MoveEnd::kReached);
+  EXPECT_EQ(machine.x().state().fault, "");
+}
+
+// Loads of up to 40 % of the torque, accelerations and turns are none.
+TEST_P(StallFault, IsNoneInSoundMotions) {
+  for (const double friction : {0.0, 0.4}) {
+    WithWall machine(axis(), friction, false);
+    machine.x().setPosition(0.0);
+    for (const double place : {-0.09, 0.05, -0.02, 0.09}) machine.bench.move(place);
+    const axis::Move turned = machine.x().moveTo(-0.09);
+    machine.bench.machine->advance(0.5);
+    machine.x().wait(machine.x().moveTo(0.05));
+    EXPECT_EQ(machine.x().wait(turned).end, axis::MoveEnd::kReplaced);
+    EXPECT_EQ(machine.x().state().fault, "") << friction;
+  }
+}
+
+TEST_P(StallFault, IsWatchedForAfterAHoming) {
+  WithWall machine(axis(), 0.2);
+  const HomingResult result = machine.x().home();
+  ASSERT_EQ(result.end, HomingEnd::kHomed) << result.message;
+  EXPECT_EQ(machine.bench.rig.registerOf("x", kStallBelow), 60U);
+  EXPECT_EQ(machine.bench.rig.registerOf("x", kStallAbove), 313U);
+}
+
+INSTANTIATE_TEST_SUITE_P(, StallFault, ::testing::Bool(),
+                         [](const auto& way) { return way.param ? "ByDiag" : "ByTheUart"; });
+
+// What DIAG reports is named by the registers.
+TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
+  WithWall machine(stallAxis(true));
+  machine.x().setPosition(0.0);
+  machine.x().moveTo(-0.04);
+  machine.bench.machine->advance(0.2);
+  sim::TmcTrouble trouble;
+  trouble.over_temperature = true;
+  machine.bench.rig.setTrouble("x", trouble);
+  machine.bench.machine->advance(0.1);
+  EXPECT_TRUE(contains(machine.x().state().fault, "because of over-temperature"))
+      << machine.x().state().fault;
 }
 
 INSTANTIATE_TEST_SUITE_P(, StallHoming, ::testing::Bool(),

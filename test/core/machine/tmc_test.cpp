@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -10,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "bus/open_port.h"
 #include "bus/serial_port.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/driver/driver_chip.h"
@@ -107,6 +109,50 @@ TEST(TmcDrivers, MeasureTheirLoadInMotion) {
   const std::uint64_t before = load().transactions;
   bench.machine->advance(1.0);
   EXPECT_LE(load().transactions, before + 20) << "not at rest";
+}
+
+// The current of the idle timeout, until the next motion; it needn't wait for the register.
+TEST(TmcDrivers, GetALowerCurrentWhileTheyAreIdle) {
+  config::AxisConfig config = tmcAxis();
+  config.idle_timeout = 2.0;
+  config.idle_action = config::IdleAction::kLowerCurrent;
+  config.tmc->idle_current = 0.1;
+  Bench bench({config});
+  axis::Axis& x = bench.axis();
+  const auto currents = [&bench] { return bench.rig.registerOf("x", kIholdIrun) & 0x1F1FU; };
+  x.setPosition(0.0);
+  bench.move(0.001);
+  bench.machine->advance(1.5);
+  EXPECT_FALSE(x.state().idle);
+  EXPECT_EQ(currents(), 0x190CU);
+  bench.machine->advance(1.0);
+  EXPECT_TRUE(x.state().idle);
+  EXPECT_TRUE(x.state().enabled);
+  EXPECT_TRUE(x.state().position_valid);
+  // 0.979 A / 32 for each step of the scale: 3 of them.
+  EXPECT_EQ(currents(), 0x1902U);
+  EXPECT_NEAR(x.state().drivers->front().hold_current, 0.0918, 1e-4);
+  // Another hold current counts from the next motion on.
+  x.setCurrent(0.8, 0.3);
+  EXPECT_EQ(currents(), 0x1902U);
+  const axis::Move move = x.moveTo(0.002);
+  EXPECT_NEAR(move.duration, 2.0 * std::sqrt(0.001), 1e-3);
+  x.wait(move);
+  EXPECT_FALSE(x.state().idle);
+  EXPECT_EQ(currents(), 0x1908U);
+  // A driver that is set up anew while it is idle, and one that is disabled.
+  bench.machine->advance(3.0);
+  EXPECT_EQ(currents(), 0x1902U);
+  bench.rig.brownOut("x");
+  bench.machine->advance(0.5);
+  bench.machine->recover();
+  bench.machine->advance(0.1);
+  EXPECT_EQ(currents(), 0x1902U);
+  x.enable(false);
+  x.enable(true);
+  bench.machine->advance(0.1);
+  EXPECT_EQ(currents(), 0x1908U);
+  EXPECT_EQ(x.state().fault, "");
 }
 
 // A clock that moves from event to event would otherwise never rest.
@@ -716,6 +762,22 @@ TEST(TmcDrivers, OfWhichTwoHaveOneAddressAreFound) {
   rig[1].tmc->address = 0;
   Bench bench(axes, rig);
   EXPECT_PRED2(has, bench.axis("y").state().fault, "at address 1, no chip answers");
+}
+
+// As after its reset: the trimmer would set its current. Another master on the wire puts it back.
+TEST(TmcDrivers, DoNotLeaveTheirCurrentToVref) {
+  Bench bench({tmcAxis("x", 0), tmcAxis("y", 1)});
+  EXPECT_EQ(bench.rig.registerOf("x", kGconf) & 1U, 0U);
+  bench.axis().setPosition(0.0);
+  bus::openPort(kPort, 115'200, bench.backend.simulatedSerial(kPort))
+      ->writeUnchecked(0, kGconf, 0x1C1);
+  bench.machine->advance(1.5);
+  EXPECT_PRED2(has, bench.axis().state().fault, "VREF sets its current now");
+  EXPECT_PRED2(has, bench.axis().state().remedy, "call recover");
+  EXPECT_EQ(bench.axis("y").state().fault, "");
+  bench.machine->recover();
+  EXPECT_EQ(bench.axis().state().fault, "");
+  EXPECT_EQ(bench.rig.registerOf("x", kGconf), 0x1C0U);
 }
 
 TEST(TmcDrivers, ShareASlowPort) {

@@ -86,7 +86,8 @@ struct AxisState {
   /// The line of its brake has the level that engages it, or could not be given that level. False
   /// while it is released, and if the axis has no brake.
   bool brake_engaged = false;
-  bool idle = false;  ///< disabled or asleep by its idle timeout; the next motion ends that
+  /// Disabled, asleep or at a lower current by its idle timeout; the next motion ends that.
+  bool idle = false;
   bool moving = false;
   bool held = false;  ///< the machine is on hold: this axis too, moving or not
   bool homed = false;

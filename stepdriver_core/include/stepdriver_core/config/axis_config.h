@@ -93,8 +93,12 @@ struct BrakeConfig {
   std::int64_t engage_ns = 0;   ///< [ns] from the other level until it holds the load
 };
 
-/// How the motor's current is switched off at rest.
-enum class IdleAction { kDisable, kSleep };
+/// How the motor's current is switched off or lowered at rest.
+enum class IdleAction {
+  kDisable,
+  kSleep,
+  kLowerCurrent,  ///< to TmcConfig::idle_current of each of its motors
+};
 
 /// What tells an axis where it is when it is homed.
 enum class HomingKind {
@@ -241,7 +245,7 @@ struct AxisConfig : MotorConfig {
   bool align_on_microstep_change = false;
 
   double idle_timeout = 0.0;                      ///< [s] at rest until the idle action; 0: never
-  IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired if there is a timeout
+  IdleAction idle_action = IdleAction::kDisable;  ///< its pin is wired with a timeout
   /// The carriage stays where it is without current, as with a self-locking screw.
   bool holds_position_unpowered = false;
 

@@ -22,6 +22,13 @@ struct StallConfig {
   std::optional<int> phase;
 };
 
+/// How a driver chip detects in any motion that its motor has stalled (StallGuard), which is a
+/// fault.
+struct StallFaultConfig {
+  int threshold = 0;   ///< 0 to 255: SG_RESULT at or below twice this is a stall
+  double above = 0.0;  ///< [full steps/s] of the motor: below this speed SG_RESULT means nothing
+};
+
 /// A driver chip that is configured and diagnosed over its UART or SPI. A program that makes its
 /// own config::MotorConfig gives it a driver::registerChip().
 ///
@@ -43,11 +50,14 @@ struct TmcConfig {
   double run_current = 0.0;     ///< [A rms] of a coil, in motion
   double hold_current = 0.0;    ///< [A rms] at rest, hold_delay after the last step
   double hold_delay = 0.5;      ///< [s]
+  /// [A rms] at rest after the idle timeout, with IdleAction::kLowerCurrent.
+  std::optional<double> idle_current;
   ChopperMode mode = ChopperMode::kStealthChop;
   /// [full steps/s] With kStealthChop: above this speed of the motor it chops as kSpreadCycle does;
   /// 0: at none.
   double spread_cycle_above = 0.0;
   std::optional<StallConfig> stall;
+  std::optional<StallFaultConfig> stall_fault;
   bool interpolate = true;  ///< the chip divides each microstep into steps of 1/256
 };
 
