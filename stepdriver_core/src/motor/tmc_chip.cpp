@@ -63,12 +63,12 @@ TmcChip::TmcChip(const config::MotorConfig& motor) : motor_(motor), settings_(se
 }
 
 void TmcChip::noteCurrents() {
-  const tmc::CurrentScale scale = inForce(settings_.current);
+  const tmc::CurrentScale scale = effective(settings_.current);
   state_.run_current = currentOf(scale.run);
   state_.hold_current = currentOf(scale.hold);
 }
 
-tmc::CurrentScale TmcChip::inForce(tmc::CurrentScale scale) const {
+tmc::CurrentScale TmcChip::effective(tmc::CurrentScale scale) const {
   if (is_idle_) {
     scale.hold =
         std::min(scale.hold, tmc::scaleBelow(*config().idle_current, scale.range, board()));
@@ -97,7 +97,7 @@ bus::RegisterAccess TmcChip::read(std::uint8_t number, std::uint32_t volatile_bi
 bus::RegisterJob TmcChip::setUp(int microsteps, const std::vector<int>& port_addresses) const {
   const auto address = static_cast<std::uint8_t>(config().address);
   tmc::Settings settings = settings_;
-  settings.current = inForce(settings.current);
+  settings.current = effective(settings.current);
   const std::vector<tmc::RegisterValue> values = tmc::setUpOf(settings, microsteps);
   Accesses all;
   // An answer that comes too soon is a frame to the other chips, which then don't hear the next.
@@ -150,7 +150,7 @@ tmc::CurrentScale TmcChip::scaleOf(double run, double hold) const {
 }
 
 bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) const {
-  return jobOf({write(tmc::kIholdIrun, tmc::currentsOf(inForce(scale)))});
+  return jobOf({write(tmc::kIholdIrun, tmc::currentsOf(effective(scale)))});
 }
 
 bus::RegisterJob TmcChip::setIdle(bool idle) {
@@ -200,7 +200,7 @@ bus::RegisterJob TmcChip::endStall() const {
   return jobOf({write(tmc::kTcoolthrs, 0),
                 write(tmc::kSgthrs, static_cast<std::uint32_t>(settings_.stall_threshold)),
                 write(tmc::kTpwmthrs, threshold(settings_.spread_cycle_above)),
-                write(tmc::kIholdIrun, tmc::currentsOf(inForce(settings_.current))),
+                write(tmc::kIholdIrun, tmc::currentsOf(effective(settings_.current))),
                 write(tmc::kTcoolthrs, threshold(settings_.stall_above))});
 }
 

@@ -145,7 +145,7 @@ class TmcChip {
   std::string place() const;  // "on /dev/serial0 at address 1"
   void noteCurrents();
   /// With the hold current of the idle timeout, if that is over.
-  driver::tmc::CurrentScale inForce(driver::tmc::CurrentScale scale) const;
+  driver::tmc::CurrentScale effective(driver::tmc::CurrentScale scale) const;
   bool isStalled(const bus::RegisterDone& done, const driver::tmc::Status& status) const;
   double currentOf(int scale) const;  // [A rms]
   /// What of these flags stops the motor.

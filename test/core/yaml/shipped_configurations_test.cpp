@@ -1,7 +1,9 @@
 // The configurations of config/ on the rig, each axis as fast as it may.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "stepdriver_core/setup/hardware.h"
 #include "stepdriver_core/yaml.h"
@@ -9,6 +11,13 @@
 
 namespace stepdriver::yaml {
 namespace {
+
+/// Its rotor has been blocked.
+bool isHomedToAStall(const std::vector<config::AxisConfig>& axes, const std::string& name) {
+  return std::any_of(axes.begin(), axes.end(), [&name](const config::AxisConfig& axis) {
+    return axis.name == name && axis.homing && axis.homing->kind == config::HomingKind::kStall;
+  });
+}
 
 class ShippedConfiguration : public testing::TestWithParam<const char*> {};
 
@@ -39,10 +48,11 @@ TEST_P(ShippedConfiguration, LosesNoStep) {
   sim::Rig& rig = hardware.simulation()->rig();
   for (const std::string& name : rig.axes()) {
     const sim::RigAxisReport seen = rig.report(name);
+    EXPECT_EQ(seen.totalViolations(), 0) << name << ": " << test::violationsOf(seen);
+    if (isHomedToAStall(config.axes, name)) continue;
     EXPECT_EQ(seen.lost_steps, 0) << name << ", largest lag " << seen.largest_lag;
     EXPECT_GT(seen.largest_lag, 1.0) << name;
     EXPECT_LT(seen.largest_lag, 120.0) << name;
-    EXPECT_EQ(seen.totalViolations(), 0) << name << ": " << test::violationsOf(seen);
   }
 }
 
@@ -50,7 +60,8 @@ INSTANTIATE_TEST_SUITE_P(Shipped, ShippedConfiguration,
                          testing::Values("a4988.yaml", "board.yaml", "camera.yaml", "corexy.yaml",
                                          "drv8825.yaml", "gantry.yaml", "pen_plotter.yaml",
                                          "plotter.yaml", "rotary_axis.yaml", "tb6600.yaml",
-                                         "tmc2209.yaml", "two_axes.yaml", "wheel.yaml"));
+                                         "tmc2209.yaml", "tmc5160.yaml", "two_axes.yaml",
+                                         "wheel.yaml"));
 
 }  // namespace
 }  // namespace stepdriver::yaml
