@@ -15,7 +15,7 @@ class OutputsAndInputs(support.MachineTest):
     }
 
     def test_have_their_states_by_name(self):
-        off = OutputState(on=False, changed=None, note="", error="")
+        off = OutputState(on=False, changed=None, note="", error="", axis="", compared=0, missed=0)
         self.assertEqual(self.machine.outputs, {"lamp": off, "pen": off})
         self.assertEqual(self.machine.inputs, {"paper": InputState(active=False, changed=None, error="")})
 
@@ -66,6 +66,35 @@ class OutputsAndInputs(support.MachineTest):
         for outputs, leads in (({"pan": True}, {}), ({"pen": True}, {"pen": (11.0, 0.0)})):
             with self.assertRaisesRegex(Refused, "pan|pen"):
                 self.machine.follow_path(["x"], [line([0.07], outputs=outputs)], leads=leads)
+
+    def test_the_position_of_an_axis_switches_an_output(self):
+        x = self.machine["x"]
+        x.set_position(0.0)
+        self.machine.set_position_compare("lamp", "x", every=(0.002, 0.01, 0.02), pulse=0.001)
+        x.move_to(0.05).wait()
+        lamp = self.machine.outputs["lamp"]
+        self.assertEqual((lamp.axis, lamp.compared, lamp.missed), ("x", 6, 0))
+        self.machine.set_position_compare("lamp", "x", cams=[(0.01, 0.03)], direction="down", lead_on=0.001)
+        x.move_to(0.02).wait()
+        self.assertTrue(self.machine.outputs["lamp"].on)
+        self.machine.clear_position_compare("lamp")
+        lamp = self.machine.outputs["lamp"]
+        self.assertEqual((lamp.axis, lamp.on), ("", False))
+
+    def test_a_position_switches_only_what_it_can(self):
+        refused = {
+            "pan": dict(output="pan", axis="x", places=[0.01], pulse=0.001),
+            "y": dict(output="lamp", axis="y", places=[0.01], pulse=0.001),
+            "cam": dict(output="lamp", axis="x", cams=[(0.03, 0.01)]),
+            "pulse": dict(output="lamp", axis="x", places=[0.01], pulse=float("nan")),
+            "lead_on": dict(output="lamp", axis="x", cams=[(0.01, 0.02)], lead_on=11.0),
+        }
+        for name, arguments in refused.items():
+            with self.assertRaisesRegex(Refused, name):
+                self.machine.set_position_compare(**arguments)
+        with self.assertRaisesRegex(ValueError, "'left'.*'both', 'up' or 'down'"):
+            self.machine.set_position_compare("lamp", "x", places=[0.01], pulse=0.001, direction="left")
+        self.assertEqual(self.machine.outputs["lamp"].axis, "")
 
     def test_unknown_names_are_refused(self):
         with self.assertRaisesRegex(Refused, r"^there is no output pan \(outputs: .*pen.*\)$"):

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -234,6 +235,39 @@ machine::IoStates ioStatesOf(const Session& session) {
 py::dict outputsOf(const Session& session) { return byName(ioStatesOf(session).outputs); }
 py::dict inputsOf(const Session& session) { return byName(ioStatesOf(session).inputs); }
 
+// The values of Python's set_position_compare(), for the output of a name.
+void setPositionCompare(const Session& session, const std::string& output, const std::string& axis,
+                        int direction, const std::vector<std::pair<double, double>>& cams,
+                        const std::vector<double>& places,
+                        const std::optional<std::tuple<double, double, double>>& every, bool at_end,
+                        const std::map<std::string, double>& times) {
+  using config::PositionCompare;
+  PositionCompare compare;
+  compare.axis = axis;
+  if (direction != 0) {
+    compare.direction =
+        direction > 0 ? PositionCompare::Direction::kUp : PositionCompare::Direction::kDown;
+  }
+  for (const auto& [from, to] : cams) compare.cams.push_back({from, to});
+  compare.places = places;
+  if (every) {
+    const auto& [distance, from, to] = *every;
+    compare.every = PositionCompare::Every{distance, from, to};
+  }
+  compare.at_end = at_end;
+  const auto nanoseconds = [&times](const char* name) {
+    constexpr double kMost = 10.0;
+    const double seconds = times.at(name);
+    if (seconds >= 0.0 && seconds <= kMost) return std::llround(seconds * 1e9);
+    throw Refused(std::string(name) + " is " + std::string(py::repr(py::float_(seconds))) +
+                  " s, but must be 0 to 10 s");
+  };
+  compare.pulse_ns = nanoseconds("pulse");
+  compare.lead_on_ns = nanoseconds("lead_on");
+  compare.lead_off_ns = nanoseconds("lead_off");
+  session.run([&](OpenMachine& open) { open.machine().setPositionCompare(output, compare); });
+}
+
 setup::Simulation& simulationOf(OpenMachine& open) {
   setup::Simulation* const simulation = open.hardware().simulation();
   if (simulation == nullptr) throw Refused("there is no rig: the machine drives GPIO lines");
@@ -403,6 +437,9 @@ void bindMachine(SessionClass& session) {
              return self.run([](OpenMachine& open) { return open.machine().emergencyStopped(); });
            })
       .def("set_output", command(&Machine::setOutput), "name"_a, "on"_a)
+      .def("set_position_compare", &setPositionCompare, "output"_a, "axis"_a, "direction"_a,
+           "cams"_a, "places"_a, "every"_a, "at_end"_a, "times"_a)
+      .def("clear_position_compare", command(&Machine::clearPositionCompare), "output"_a)
       .def("outputs", &outputsOf)
       .def("inputs", &inputsOf)
       .def("figures",

@@ -347,6 +347,55 @@ class Machine:
         """
         self._session.set_output(name, on)
 
+    def set_position_compare(
+        self,
+        output: str,
+        axis: str,
+        *,
+        cams: Iterable[Tuple[float, float]] = (),
+        places: Iterable[float] = (),
+        every: Optional[Tuple[float, float, float]] = None,
+        at_end: bool = False,
+        pulse: float = 0.0,
+        direction: str = "both",
+        lead_on: float = 0.0,
+        lead_off: float = 0.0,
+    ) -> None:
+        """Lets the position of an axis switch an output with a name, at the nanosecond at which the joint arrives at a
+        place, until clear_position_compare(). The axis never stops for it. An output has cams, or pulses at any of the
+        others.
+
+        cams: [unit] pairs of places: the output is on from the first one to the second.
+        places: [unit] a pulse at each.
+        every: distance, begin and end [unit]: a pulse at begin, and at each further distance as far as end.
+        at_end: a pulse when a motion has come to its target.
+        pulse: [s] how long a pulse is on, from 0.00001 to 10.
+        direction: "both", or in which the axis must move: "up" or "down".
+        lead_on, lead_off: [s] how much earlier than at its place it is switched, from 0 to 10.
+
+        ``outputs[output].compared`` counts what was made, and ``missed`` what was passed and couldn't be.
+
+        Raises Refused if there is no such output or axis, a place is outside of the soft limits, the output can't be
+        switched as fast as the top speed of the axis would need it, or the axis moves.
+        """
+        directions = {"both": 0, "up": 1, "down": -1}
+        if direction not in directions:
+            raise ValueError(f"direction is {direction!r}, but must be 'both', 'up' or 'down'")
+        self._session.set_position_compare(
+            output,
+            axis,
+            directions[direction],
+            [(float(begin), float(end)) for begin, end in cams],
+            [float(place) for place in places],
+            every,
+            at_end,
+            {"pulse": pulse, "lead_on": lead_on, "lead_off": lead_off},
+        )
+
+    def clear_position_compare(self, output: str) -> None:
+        """No position switches the output any more: it goes off. Raises Refused if there is no such output."""
+        self._session.clear_position_compare(output)
+
     # ---- time and figures ----
 
     @property

@@ -210,6 +210,12 @@ class OutputState:
     """Why it was switched off by itself; empty until that happens."""
     error: str
     """Why its line could not be written, so that ``on`` isn't certain; empty: it could."""
+    axis: str
+    """Whose position switches it, see ``Machine.set_position_compare()``; empty: none does."""
+    compared: int
+    """What positions have made it do since the start."""
+    missed: int
+    """What they could not: a pulse was due while the one before was on, or the output was in its safe state."""
 
 
 @dataclass(frozen=True)
