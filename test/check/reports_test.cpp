@@ -126,6 +126,16 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   EXPECT_EQ(pins,
             "x/left/step=S x/left/enable, x/right/enable=N x/left/m0=M x/left/endstops/min=E "
             "x/left/fault=F x/right/step=R x/right/ms1=O ");
+  config::AxisConfig coils;
+  coils.name = "x";
+  coils.driver = driver::driverChip("uln2003");
+  coils.pins.in1.line = "A";
+  coils.pins.in2.line = "B";
+  coils.pins.in3.line = "C";
+  coils.pins.in4.line = "D";
+  pins.clear();
+  for (const NamedLine& line : linesOf({coils})) pins += line.pin + "=" + line.line + " ";
+  EXPECT_EQ(pins, "x/in1=A x/in2=B x/in3=C x/in4=D ");
   machine::MachineOptions options;
   options.emergency_stop = config::InputSwitch{"T", true, Bias::kAsIs};
   options.heartbeat = machine::HeartbeatConfig{"H"};

@@ -61,6 +61,19 @@ TEST(Findings, SwapTheLinesOfADriverWithOneForEachDirection) {
                 "x: pins/cw and pins/ccw are swapped, because its plus was your minus"}));
 }
 
+TEST(Findings, ReverseTheCoilsOfAMotorOfPhases) {
+  Findings findings = findingsOf("x");
+  findings.wrong_way = true;
+  const std::string axis = "axes:\n  x:\n    pins: {in1: A, in2: B, in3: C, in4: D}\n";
+  EXPECT_EQ(text(corrected(valueOf(axis), findings)),
+            text(valueOf("axes:\n  x:\n    pins: {in1: D, in2: C, in3: B, in4: A}\n")));
+  config::AxisConfig config;
+  config.driver.step_inputs = driver::StepInputs::kPhases;
+  EXPECT_EQ(changesText(findings, config),
+            (std::vector<std::string>{"x: pins/in1 and pins/in4, and pins/in2 and pins/in3, are "
+                                      "swapped, because its plus was your minus"}));
+}
+
 TEST(Findings, InvertASwitchBeforeTheyAreSwapped) {
   Findings findings = findingsOf("x");
   findings.min_inverted = true;

@@ -64,7 +64,8 @@ class Dump {
     for (const int microsteps : chip.microsteps) add(microsteps);
   }
   void add(const config::Pins& pins) {
-    all(pins.step, pins.dir, pins.enable, pins.ms1, pins.ms2, pins.ms3, pins.sleep, pins.reset);
+    all(pins.step, pins.dir, pins.enable, pins.ms1, pins.ms2, pins.ms3, pins.sleep, pins.reset,
+        pins.in1, pins.in2, pins.in3, pins.in4);
   }
   void add(const config::MotorConfig& motor) {
     all(motor.motor, motor.driver, motor.pins, motor.endstop_min, motor.endstop_max, motor.fault,

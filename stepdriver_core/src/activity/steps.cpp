@@ -16,6 +16,10 @@ void PinsStep::post(pulse::Command::Kind kind) {
   if (kind == pulse::Command::Kind::kRelease) {
     command.ready = due_;
     command.scale = writes_.scale;
+    if (const auto on = writes_.sequence.coils) {
+      command.coils = axis_.motor.coilCurrent(*on);
+      if (*on) command.ready += axis_.config.timing().enable_ns;
+    }
   }
   context_.out->commands.push_back(command);
 }
@@ -121,6 +125,7 @@ void PinsStep::fail(int error) {
   axis_.rest_since = context_.now;
   if (writes_.failed) writes_.failed();
   writes_.scale.reset();
+  writes_.sequence.coils.reset();
   due_ = context_.now;
   post(pulse::Command::Kind::kRelease);
   throw GpioError(axis_.name() + ": " + text);

@@ -18,8 +18,9 @@ struct AxisMemory {
   bool homed = false;
   bool at_home = false;  ///< the chip's translator was in its state after a reset
   bool moving = false;
-  /// [1/256 full step] MSCNT of the driver of each motor that has one with registers, of this axis
-  /// and then of those that share its motors; or kUnknownMscnt.
+  /// [1/256 full step] MSCNT of the driver of each motor that has one with registers, or the place
+  /// of the pattern of its coils if lines switch them, of this axis and then of those that share
+  /// its motors; or kUnknownMscnt.
   std::vector<int> mscnt;
 
   bool operator==(const AxisMemory& other) const {

@@ -470,6 +470,13 @@ AxisMemory AxisModel::memory() const {
   return memory;
 }
 
+void AxisModel::continueCoils(const AxisMemory& kept) {
+  if (!motor.hasCoils()) return;
+  for (std::size_t i = 0; i < std::min(config.motors(), kept.mscnt.size()); ++i) {
+    motor.continueCoils(i, kept.mscnt[i]);
+  }
+}
+
 void AxisModel::rememberRest() {
   if (moving()) return;
   rest_.kind = config.kind;
@@ -482,15 +489,16 @@ void AxisModel::rememberRest() {
                   std::all_of(sharers_.begin(), sharers_.end(),
                               [](const AxisModel* sharer) { return sharer->motor.areAtHome(); });
   rest_.mscnt.clear();
-  forEachTmc([this](const motor::Motor& any, std::size_t i) {
+  forEachPlaced([this](const motor::Motor& any, std::size_t i) {
     rest_.mscnt.push_back(any.mscntOf(i).value_or(kUnknownMscnt));
   });
 }
 
-void AxisModel::forEachTmc(const std::function<void(const motor::Motor&, std::size_t)>& act) const {
+void AxisModel::forEachPlaced(
+    const std::function<void(const motor::Motor&, std::size_t)>& act) const {
   const auto each = [&act](const motor::Motor& any) {
     for (std::size_t i = 0; i < any.chips(); ++i) {
-      if (any.tmcAt(i) != nullptr) act(any, i);
+      if (any.tmcAt(i) != nullptr || any.hasCoils()) act(any, i);
     }
   };
   each(motor);
@@ -500,10 +508,15 @@ void AxisModel::forEachTmc(const std::function<void(const motor::Motor&, std::si
 AxisModel::ChipsSince AxisModel::chipsSince(const AxisMemory& kept) const {
   ChipsSince since = ChipsSince::kSame;
   std::size_t number = 0;
-  forEachTmc([&](const motor::Motor& any, std::size_t i) {
-    const motor::TmcChip& chip = *any.tmcAt(i);
+  forEachPlaced([&](const motor::Motor& any, std::size_t i) {
     const int then = number < kept.mscnt.size() ? kept.mscnt[number] : kUnknownMscnt;
     ++number;
+    if (any.hasCoils()) {
+      // The pattern has continued there, or couldn't.
+      if (any.mscntOf(i) != then && since == ChipsSince::kSame) since = ChipsSince::kUnknown;
+      return;
+    }
+    const motor::TmcChip& chip = *any.tmcAt(i);
     if (!chip.isSetUp() || !chip.keptItsPower() || then == kUnknownMscnt) {
       if (since == ChipsSince::kSame) since = ChipsSince::kUnknown;
     } else if (then != chip.mscnt()) {

@@ -192,6 +192,8 @@ class AxisModel {
   /// @name Over a restart
   /// @{
   AxisMemory memory() const;
+  /// The patterns of its motors' coils, if lines switch them, continue where they were.
+  void continueCoils(const AxisMemory& kept);
   /// Called at the end of each turn: if the axis is at rest, a motion may begin from here.
   void rememberRest();
   /// Why a kept position can't be the axis's; empty if it can.
@@ -237,15 +239,16 @@ class AxisModel {
   /// A chip's translator follows STEP without current.
   bool countsWhileDisabled() const;
 
-  /// What the drivers with registers say of the time since a memory.
+  /// What the drivers whose place is known say of the time since a memory.
   enum class ChipsSince {
     kSame,     ///< all of them have kept their power, and have counted no step
     kStepped,  ///< one has kept its power, and has counted steps
     kUnknown,
   };
   ChipsSince chipsSince(const AxisMemory& kept) const;
-  /// For each driver with registers, of this axis and of those that share its motors.
-  void forEachTmc(const std::function<void(const motor::Motor& any, std::size_t i)>& act) const;
+  /// For each motor whose place in the electrical cycle is known, of this axis and of those that
+  /// share its motors: its driver has registers, or lines switch its coils.
+  void forEachPlaced(const std::function<void(const motor::Motor& any, std::size_t i)>& act) const;
 
   std::vector<AxisModel*> sharing_;  // in the order of the kinematics
   std::vector<AxisModel*> sharers_;  // without itself

@@ -39,7 +39,11 @@ Roles outputRoles(const motor::ChipLines& own, bool cw_ccw) {
           {own.reset, "RESET"},
           {own.mode[0], "microstep"},
           {own.mode[1], "microstep"},
-          {own.mode[2], "microstep"}};
+          {own.mode[2], "microstep"},
+          {own.coils[0], "IN1"},
+          {own.coils[1], "IN2"},
+          {own.coils[2], "IN3"},
+          {own.coils[3], "IN4"}};
 }
 
 /// What a line of an axis is for, and of which motor if there are several.

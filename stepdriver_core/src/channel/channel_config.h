@@ -17,6 +17,11 @@ struct Signal {
   bool active = true;
 };
 
+/// The most coils of a motor that lines switch.
+constexpr std::size_t kCoils = 4;
+/// Coils that have current, a bit for each: the first one's is the lowest.
+using CoilSet = std::uint8_t;
+
 /// The lines of a motor of an axis.
 struct MotorSignals {
   Signal step;
@@ -28,6 +33,7 @@ struct MotorSignals {
   /// active, on every motor that has one. If one isn't within the timeout after the end of the
   /// profile, the motion ends as kNotInPosition.
   std::optional<Signal> in_position;
+  std::array<Signal, kCoils> coils;  ///< see ChannelConfig::patterns
 };
 
 /// The most motors that an axis can have.
@@ -36,6 +42,13 @@ constexpr std::size_t kMostMotors = 4;
 /// Motors of an axis, a bit for each: the first motor's is the lowest.
 using MotorSet = std::uint8_t;
 constexpr MotorSet motorBit(std::size_t motor) { return static_cast<MotorSet>(1U << motor); }
+
+/// Whether the coils of the motors of a channel have current, and for each motor, the number of the
+/// pattern that they have then, or would have.
+struct CoilCurrent {
+  bool on = false;
+  std::array<std::uint8_t, kMostMotors> places{};
+};
 
 /// [microsteps] One for each motor of an axis.
 using MotorCounts = std::array<std::int32_t, kMostMotors>;
@@ -72,6 +85,11 @@ struct ChannelConfig : MotorSignals {
   /// dir_setup and dir_hold are kept between the pulses of the two.
   bool dir_steps = false;
   bool both_edges = false;  ///< each edge of `step` is a step
+  /// Motors whose coils are switched by lines, MotorSignals::coils, instead of `step` and `dir`:
+  /// the coils that have current at each step of an electrical cycle. A step is a write of those
+  /// that change. The longer one of step_high and step_low is the shortest time between two. Empty:
+  /// the motors have `step` and `dir`.
+  std::vector<CoilSet> patterns;
   Nanoseconds step_high = 0;
   Nanoseconds step_low = 0;
   Nanoseconds dir_setup = 0;

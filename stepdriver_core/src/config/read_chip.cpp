@@ -23,7 +23,8 @@ using driver::TranslatorState;
 constexpr const char* kDescribed = "step_dir";
 const std::vector<std::string> kLevels = {"low", "high"};
 const std::vector<std::string> kLevelsOrNone = {"low", "high", "none"};
-const std::vector<std::string> kStepInputs = {"step_dir", "cw_ccw"};
+// The words in the order of StepInputs.
+const std::vector<std::string> kStepInputs = {"step_dir", "cw_ccw", "phases"};
 const std::vector<std::string> kStepEdges = {"one", "both"};
 const std::vector<std::string> kFaultEnds = {"itself", "reset", "enable", "power"};
 const std::vector<std::string> kStates = {"held", "counts", "home"};
@@ -168,13 +169,19 @@ class ChipReader {
     const bool wires_enable = isWired("enable");
     const auto inputs = reader_.findOneOf("step_inputs", kStepInputs, Presence::kOptional);
     if (inputs) {
-      chip_.step_inputs =
-          inputs == "cw_ccw" ? driver::StepInputs::kCwCcw : driver::StepInputs::kStepDir;
+      readStepInputs(*inputs);
     } else if (reader_.has("step_inputs") && isWired("cw")) {
       chip_.step_inputs = driver::StepInputs::kCwCcw;  // one mistake gives one message
     }
     const auto edges = reader_.findOneOf("step_edges", kStepEdges, Presence::kOptional);
-    if (edges) chip_.both_edges = edges == "both";
+    if (edges && hasPhases() && edges != "both") {
+      reader_.contradiction("step_edges",
+                            fmt::format("is {}, but must be both: each change of the coils that "
+                                        "the {} switches is a step",
+                                        reader_.shown("step_edges"), chip_.title));
+    } else if (edges) {
+      chip_.both_edges = edges == "both";
+    }
     if (chip_.both_edges && chip_.step_inputs == driver::StepInputs::kCwCcw) {
       reader_.contradiction(
           edges ? "step_edges" : "step_inputs",
@@ -209,6 +216,22 @@ class ChipReader {
 
  private:
   bool isDescribed() const { return chip_.name == kDescribed; }
+
+  bool hasPhases() const { return chip_.step_inputs == driver::StepInputs::kPhases; }
+
+  void readStepInputs(const std::string& text) {
+    const auto found = std::find(kStepInputs.begin(), kStepInputs.end(), text);
+    const auto inputs = static_cast<driver::StepInputs>(found - kStepInputs.begin());
+    if ((inputs == driver::StepInputs::kPhases) == hasPhases()) {
+      chip_.step_inputs = inputs;
+      return;
+    }
+    reader_.contradiction(
+        "step_inputs",
+        fmt::format("is {}, but the {} {}", reader_.shown("step_inputs"), chip_.title,
+                    hasPhases() ? "switches the coils of its motor: it is phases"
+                                : "takes pulses; a uln2003 has phases"));
+  }
 
   bool isWired(const std::string& pin) const { return pins_.count(pin) > 0; }
 

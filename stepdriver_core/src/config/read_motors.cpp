@@ -68,7 +68,8 @@ void checkSamePins(ConfigReader& motors, const AxisConfig& config) {
 /// Their steps are the same edges.
 void checkSameEdges(ConfigReader& motors, const AxisConfig& config) {
   const auto edges = [](const driver::DriverChip& chip) {
-    return chip.both_edges                                  ? "steps on both edges of STEP"
+    return chip.step_inputs == driver::StepInputs::kPhases  ? "switches the coils of its motor"
+           : chip.both_edges                                ? "steps on both edges of STEP"
            : chip.step_inputs == driver::StepInputs::kCwCcw ? "has CW and CCW inputs"
                                                             : "steps on one edge of STEP";
   };

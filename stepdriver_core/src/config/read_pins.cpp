@@ -24,16 +24,44 @@ struct PinName {
   Pin Pins::*pin;
 };
 
-constexpr std::array<PinName, 8> kPinNames{{{"step", nullptr, &Pins::step},
-                                            {"dir", nullptr, &Pins::dir},
-                                            {"enable", nullptr, &Pins::enable},
-                                            {"ms1", "m0", &Pins::ms1},
-                                            {"ms2", "m1", &Pins::ms2},
-                                            {"ms3", "m2", &Pins::ms3},
-                                            {"sleep", nullptr, &Pins::sleep},
-                                            {"reset", nullptr, &Pins::reset}}};
+constexpr std::array<PinName, 12> kPinNames{{{"step", nullptr, &Pins::step},
+                                             {"dir", nullptr, &Pins::dir},
+                                             {"enable", nullptr, &Pins::enable},
+                                             {"ms1", "m0", &Pins::ms1},
+                                             {"ms2", "m1", &Pins::ms2},
+                                             {"ms3", "m2", &Pins::ms3},
+                                             {"sleep", nullptr, &Pins::sleep},
+                                             {"reset", nullptr, &Pins::reset},
+                                             {"in1", nullptr, &Pins::in1},
+                                             {"in2", nullptr, &Pins::in2},
+                                             {"in3", nullptr, &Pins::in3},
+                                             {"in4", nullptr, &Pins::in4}}};
 
 bool isPulsePin(const PinName& name) { return name.pin == &Pins::step || name.pin == &Pins::dir; }
+
+bool isCoilPin(const PinName& name) {
+  return name.pin == &Pins::in1 || name.pin == &Pins::in2 || name.pin == &Pins::in3 ||
+         name.pin == &Pins::in4;
+}
+
+std::string upperText(std::string key) {
+  std::transform(key.begin(), key.end(), key.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::toupper(letter)); });
+  return key;
+}
+
+/// The inputs that take its steps, in words.
+const char* stepPinsText(const driver::DriverChip& chip) {
+  switch (chip.step_inputs) {
+    case driver::StepInputs::kStepDir:
+      return "STEP and DIR";
+    case driver::StepInputs::kCwCcw:
+      return "CW and CCW";
+    case driver::StepInputs::kPhases:
+      break;
+  }
+  return "IN1 to IN4";
+}
 
 /// Its name on a driver with CW and CCW inputs.
 const char* cwCcwKey(const PinName& name) { return name.pin == &Pins::step ? "cw" : "ccw"; }
@@ -89,6 +117,10 @@ Bias readBias(ConfigReader& reader, const std::string& key) {
 /// Why the chip has no such pin; empty if it has one.
 std::string whyMissing(const driver::DriverChip& chip, const PinName& name, bool by_registers) {
   const std::string without = "the " + chip.title + " has no ";
+  const bool has_phases = chip.step_inputs == driver::StepInputs::kPhases;
+  if (isCoilPin(name) != has_phases) {
+    return fmt::format("{}{} pin: it has {}", without, upperText(name.key), stepPinsText(chip));
+  }
   if (isMicrostepPin(name) && chip.modes.empty()) {
     return without + (by_registers ? "microstep pins with `tmc`: MS1 and MS2 are its address"
                                    : "microstep pins: its microsteps are set by switches");
@@ -131,6 +163,13 @@ class PinsReader {
     return chip_ == nullptr || chip_->mode_pins_from_0 || chip_->name == "step_dir";
   }
 
+  bool hasPhases() const {
+    return chip_ != nullptr && chip_->step_inputs == driver::StepInputs::kPhases;
+  }
+
+  /// Of a driver that isn't known.
+  bool namesCoils() const { return chip_ == nullptr && reader_.has("in1"); }
+
   bool isCwCcw() const {
     return chip_ != nullptr && chip_->step_inputs == driver::StepInputs::kCwCcw;
   }
@@ -147,7 +186,7 @@ class PinsReader {
     reader_.contradiction(
         other,
         fmt::format("is {}, but the {} has {} inputs: give {}", reader_.shown(other), chip_->title,
-                    isCwCcw() ? "CW and CCW" : "STEP and DIR", reader_.fullName(keyOf(name))));
+                    stepPinsText(*chip_), reader_.fullName(hasPhases() ? "in1" : keyOf(name))));
   }
 
   bool isNamed(const PinName& name) const {
@@ -178,7 +217,8 @@ class PinsReader {
       pins_.enable.line = readLineName(reader_, name.key, Presence::kOptional).value_or("");
       return;
     }
-    const auto presence = isPulsePin(name) ? Presence::kRequired : Presence::kOptional;
+    const bool is_required = isCoilPin(name) ? hasPhases() : isPulsePin(name) && !namesCoils();
+    const auto presence = is_required ? Presence::kRequired : Presence::kOptional;
     const auto line = readLine(reader_, alias ? name.from_0_key : keyOf(name), presence, used_);
     (pins_.*name.pin).line = line.value_or("");
   }
@@ -302,7 +342,7 @@ class PinsReader {
     if (!invert.findBoolean(other, Presence::kOptional) || chip_ == nullptr) return;
     invert.contradiction(
         other, fmt::format("is {}, but the {} has {} inputs{}", invert.shown(other), chip_->title,
-                           isCwCcw() ? "CW and CCW" : "STEP and DIR",
+                           stepPinsText(*chip_),
                            isCwCcw() ? ": to reverse the axis, swap pins/cw and pins/ccw" : ""));
   }
 
@@ -311,7 +351,7 @@ class PinsReader {
     const auto inverted = invert.findBoolean(key, Presence::kOptional);
     if (!inverted) return;
     if (!isNamed(name)) {
-      if (isPulsePin(name) || !reader_.isMap()) return;
+      if ((isPulsePin(name) && !hasPhases()) || !reader_.isMap()) return;
       invert.contradiction(
           key, fmt::format("is {}, but only a wired pin may be named here; {} is missing",
                            invert.shown(key), reader_.fullName(key)));
@@ -382,7 +422,7 @@ void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, Used
   brake.engage_ns = std::llround(reader.number("engage_ms", kTimes) * 1e6);
   reader.rejectUnknown();
   config.brake = brake;
-  if (!pins_are_right || config.pins.enable.wired() || config.pins.sleep.wired()) return;
+  if (!pins_are_right || config.hasSwitchedCurrent() || config.pins.sleep.wired()) return;
   axis.contradiction(
       "brake", fmt::format("is given, but needs {} or {}, and neither is wired: it follows the "
                            "motor's current, which nothing could switch",

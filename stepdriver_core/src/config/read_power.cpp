@@ -49,7 +49,7 @@ void readPower(ConfigReader& axis, bool pins_are_right, AxisConfig& config) {
   checkIdleCurrents(axis, config);
   if (config.idle_timeout <= 0.0 || config.idle_action == IdleAction::kLowerCurrent) return;
   const bool sleeps = config.idle_action == IdleAction::kSleep;
-  if ((sleeps ? config.pins.sleep : config.pins.enable).wired()) return;
+  if (sleeps ? config.pins.sleep.wired() : config.hasSwitchedCurrent()) return;
   const std::string pin = axis.fullName(sleeps ? "pins/sleep" : "pins/enable");
   axis.contradiction("idle_timeout_s",
                      fmt::format("is {}, but with idle_action {} that needs {}, which isn't wired",

@@ -296,12 +296,28 @@ DriverChip cl57t() {
   return chip;
 }
 
+/// TI SLRS027, with a motor of four phases such as the 28BYJ-48 (Kiatronics' data sheet).
+DriverChip uln2003() {
+  DriverChip chip;
+  chip.name = "uln2003";
+  chip.title = "ULN2003";
+  // tPLH and tPHL, at most.
+  setStepTimes(chip.timing, 1 * kMicrosecond);
+  // Not stated: the rotor swings to the pattern. The motor starts at 600 half steps/s at least, so
+  // it makes one in 1.7 ms, and this is six of them.
+  chip.timing.enable_ns = 10 * kMillisecond;
+  chip.microsteps = {1, 2};
+  chip.step_inputs = StepInputs::kPhases;
+  chip.both_edges = true;
+  return chip;
+}
+
 }  // namespace
 
 const std::vector<DriverChip>& namedChips() {
   static const std::vector<DriverChip> chips{a4988(),   drv8825(), tb6600(),  tmc2208(), tmc2209(),
                                              tmc2226(), tmc2130(), tmc5160(), drv8434(), lv8729(),
-                                             tb6560(),  dm542(),   dm556(),   cl57t()};
+                                             tb6560(),  dm542(),   dm556(),   cl57t(),   uln2003()};
   return chips;
 }
 

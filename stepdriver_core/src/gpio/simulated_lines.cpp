@@ -14,6 +14,8 @@ namespace stepdriver::gpio {
 // NOLINTNEXTLINE(performance-unnecessary-value-param): a board that knows its edges keeps it
 void Board::watchInput(int /*line*/, EdgeListener /*listener*/) {}
 
+void Board::onWriteEnd(std::int64_t /*time_ns*/) {}
+
 bool Board::hasSerial(const std::string& /*port*/) const { return false; }
 
 std::vector<std::uint8_t> Board::onBytes(const std::string& /*port*/, const std::uint8_t* /*bytes*/,
@@ -59,6 +61,7 @@ class SimulatedBackend::HeldLines : public Lines {
     for (const Output& output : outputs_) {
       shared_->board.onRequest(output.line, output.level, time_ns);
     }
+    shared_->board.onWriteEnd(time_ns);
   }
 
   ~HeldLines() override {
@@ -67,6 +70,7 @@ class SimulatedBackend::HeldLines : public Lines {
     for (Output& output : outputs_) {
       if (!output.request.keep_on_release) drive(output, output.request.safe_level, time_ns);
     }
+    shared_->board.onWriteEnd(time_ns);
     for (const Output& output : outputs_) {
       shared_->board.onRelease(output.line, time_ns);
       shared_->held.erase(output.request.line);
@@ -88,6 +92,7 @@ class SimulatedBackend::HeldLines : public Lines {
       if (error != 0) return error;
     }
     for (std::size_t i = 0; i < count; ++i) drive(outputOf(writes[i]), writes[i].level, time_ns);
+    shared_->board.onWriteEnd(time_ns);
     return 0;
   }
 

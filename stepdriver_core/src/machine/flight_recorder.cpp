@@ -72,6 +72,10 @@ void addPins(const config::AxisConfig& axis, std::size_t motor, const motor::Mot
   add("ms3", lines.mode[2], own.ms3, true);
   add("sleep", lines.sleep, own.sleep, chip.sleep_asleep);
   add("reset", lines.reset, own.reset, chip.reset_held);
+  add("in1", lines.coils[0], own.in1, true);
+  add("in2", lines.coils[1], own.in2, true);
+  add("in3", lines.coils[2], own.in3, true);
+  add("in4", lines.coils[3], own.in4, true);
 }
 
 std::vector<Recording::Pin> pinsOf(const std::vector<config::AxisConfig>& axes,

@@ -116,8 +116,10 @@ class Machine::Impl {
           axis::Axis::Impl{configs[i], i, wiring.motor_lines[i], *shell_, *lines_, names_})));
     }
     try {
-      ask(*shell_, BringUp{});
-      if (keeper_) startKeeping(threaded);
+      StateKeeper::Loaded loaded;
+      if (keeper_) loaded = keeper_->load();
+      ask(*shell_, BringUp{loaded.state.axes});
+      if (keeper_) startKeeping(loaded, threaded);
     } catch (const Error&) {
       // Brakes take time: the lines are released only when they are engaged.
       powerDownQuietly();
@@ -623,8 +625,7 @@ class Machine::Impl {
     }
   }
 
-  void startKeeping(bool threaded) {
-    const StateKeeper::Loaded loaded = keeper_->load();
+  void startKeeping(const StateKeeper::Loaded& loaded, bool threaded) {
     for (AxisId id = 0; id < axes_.size(); ++id) {
       const auto found = loaded.state.axes.find(axes_[id]->config().name);
       if (found != loaded.state.axes.end()) {
@@ -808,7 +809,7 @@ void Machine::enable(bool on) {
     const config::AxisConfig& config = axes()[id]->config();
     bool wired = true;
     for (std::size_t i = 0; i < config.motors(); ++i) {
-      wired = wired && config.motorAt(i).pins.enable.wired();
+      wired = wired && config.motorAt(i).hasSwitchedCurrent();
     }
     if (wired) wanted.axes.push_back(id);
   }

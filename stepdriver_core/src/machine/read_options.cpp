@@ -202,7 +202,7 @@ void readEmergencyStop(ConfigReader& machine, const std::vector<config::AxisConf
   reader.rejectUnknown();
   if (axes == nullptr || disable == EmergencyDisable::kHold || has_motor_power) return;
   for (const config::AxisConfig& axis : *axes) {
-    if (axis.pins.enable.wired()) continue;
+    if (axis.hasSwitchedCurrent()) continue;
     reader.contradiction(
         "disable",
         fmt::format("is {}, but axes/{}/pins/enable is missing, and there is no motor_power: "

@@ -32,7 +32,7 @@ class ChipPins {
   PinSequence enable(bool on) const {
     const bool level = (chip_.enable_on == on) != pins_.enable.inverted;
     PinSequence sequence;
-    sequence.add(lines_.enable, level, on ? chip_.timing.enable_ns : 0);
+    if (lines_.enable >= 0) sequence.add(lines_.enable, level, on ? chip_.timing.enable_ns : 0);
     return sequence;
   }
 

@@ -22,7 +22,8 @@ class DriverPins {
 
   /// @name If one chip of the axis has the pin wired, all have
   /// @{
-  bool hasEnable() const { return lines_.enable >= 0; }
+  /// Lines switch the current: ENABLE, or those of the coils.
+  bool hasEnable() const { return lines_.enable >= 0 || lines_.hasCoils(); }
   bool hasSleep() const { return lines_.sleep >= 0; }
   /// @}
   /// Whether any of the chips has it wired.

@@ -109,6 +109,11 @@ void Motor::forgetRegisters() {
 }
 
 std::optional<int> Motor::mscntOf(std::size_t motor) const {
+  const Translator& translator = translators_.at(motor);
+  if (hasCoils()) {
+    const int finest = driver::tmc::kFinest / translator.microsteps();
+    return static_cast<int>(translator.placeAt(countOf(motor))) * finest;
+  }
   const auto& chip = tmcs_.at(motor);
   if (chip == nullptr) return {};
   return chip->audit().mscntAt(countOf(motor), translators_.at(motor).microsteps());
@@ -117,6 +122,22 @@ std::optional<int> Motor::mscntOf(std::size_t motor) const {
 bool Motor::isAtHome(std::size_t motor) const {
   if (tmcs_.at(motor) != nullptr) return mscntOf(motor) == 0;
   return translators_.at(motor).isAtHome(countOf(motor));
+}
+
+pulse::CoilCurrent Motor::coilCurrent(bool on) const {
+  pulse::CoilCurrent current;
+  current.on = on;
+  for (std::size_t i = 0; i < translators_.size(); ++i) {
+    current.places.at(i) = static_cast<std::uint8_t>(translators_[i].placeAt(countOf(i)));
+  }
+  return current;
+}
+
+void Motor::continueCoils(std::size_t motor, int mscnt) {
+  const int finest = driver::tmc::kFinest / translators_.at(motor).microsteps();
+  if (mscnt >= 0 && mscnt % finest == 0) {
+    translators_.at(motor).wentHome(countOf(motor) - mscnt / finest);
+  }
 }
 
 bool Motor::areAtHome() const {
@@ -143,12 +164,16 @@ bool Motor::enableIsHeldByOthers() const {
 }
 
 PinSequence Motor::enable(bool on) const {
-  return pins_.enable(on, [&](int line) { return on || !isHeldByOthers(line); });
+  PinSequence sequence = pins_.enable(on, [&](int line) { return on || !isHeldByOthers(line); });
+  if (hasCoils()) sequence.coils = on;
+  return sequence;
 }
 
 PinSequence Motor::restore() const {
-  return pins_.restore([&](int line) { return power_.isEnabled() || isHeldByOthers(line); },
-                       power_.isAsleep());
+  PinSequence sequence = pins_.restore(
+      [&](int line) { return power_.isEnabled() || isHeldByOthers(line); }, power_.isAsleep());
+  if (hasCoils()) sequence.coils = power_.isEnabled();
+  return sequence;
 }
 
 void Motor::noteEnable(bool wanted) {

@@ -98,11 +98,21 @@ class Motor {
     return driver_states_;
   }
   void noteChips();
-  /// [1/256 full step] MSCNT of the chip of a motor at its present count; empty: it isn't known, or
-  /// there is no such chip.
+  /// [1/256 full step] MSCNT of the chip of a motor at its present count, or where the pattern of
+  /// its coils is; empty: it isn't known.
   std::optional<int> mscntOf(std::size_t motor) const;
   /// All of them have lost their registers.
   void forgetRegisters();
+  /// @}
+
+  /// @name Coils that are switched by lines
+  /// @{
+  /// All motors of an axis have them, or no motor.
+  bool hasCoils() const { return lines_.hasCoils(); }
+  /// Their current, at the present counts. @pre There are such coils.
+  pulse::CoilCurrent coilCurrent(bool on) const;
+  /// The pattern of a motor's coils continues from here: from a place that its mode has.
+  void continueCoils(std::size_t motor, int mscnt);
   /// @}
 
   /// @name Motors that step together

@@ -9,6 +9,7 @@
 namespace stepdriver::motor {
 
 static_assert(config::kMostMotors == pulse::kMostMotors);
+static_assert(driver::kCoils == pulse::kCoils);
 
 namespace {
 
@@ -49,6 +50,9 @@ class LineRequests {
     lines.dir = output(pins.dir, config_.hasCwCcwInputs() && !chip.step_active, false);
     // If each edge is a step, going back to the inactive level at the end could be one.
     lines.step = output(pins.step, !chip.step_active, chip.both_edges);
+    for (std::size_t i = 0; i < lines.coils.size(); ++i) {
+      lines.coils[i] = output(pins.coil(i), false, keep_);
+    }
     lines.endstop_min = input(motor.endstop_min);
     lines.endstop_max = input(motor.endstop_max);
     lines.fault = input(motor.fault);
@@ -114,6 +118,9 @@ pulse::MotorSignals signalsOf(const config::MotorConfig& motor, const ChipLines&
   pulse::MotorSignals signals;
   signals.step = {lines.step, chip.step_active != motor.pins.step.inverted};
   signals.dir = {lines.dir, (chip.step_active || !cw_ccw) != motor.pins.dir.inverted};
+  for (std::size_t i = 0; i < lines.coils.size(); ++i) {
+    signals.coils[i] = {lines.coils[i], !motor.pins.coil(i).inverted};
+  }
   if (motor.endstop_min) {
     signals.endstop_min = pulse::Signal{lines.endstop_min, motor.endstop_min->active_level};
   }
@@ -125,6 +132,18 @@ pulse::MotorSignals signalsOf(const config::MotorConfig& motor, const ChipLines&
     signals.in_position = pulse::Signal{lines.in_position, chip.in_position_active.value_or(false)};
   }
   return signals;
+}
+
+/// The steps of an electrical cycle, from Home: in full steps, each second half step.
+std::vector<pulse::CoilSet> patternsOf(const config::AxisConfig& config) {
+  std::vector<pulse::CoilSet> patterns;
+  if (!config.hasPhases()) return patterns;
+  constexpr auto kHalfStepsPerFullStep = driver::kHalfSteps.size() / driver::kFullStepsPerCycle;
+  const std::size_t by = kHalfStepsPerFullStep / static_cast<std::size_t>(config.microsteps);
+  for (std::size_t i = 0; i < driver::kHalfSteps.size(); i += by) {
+    patterns.push_back(driver::kHalfSteps.at(i));
+  }
+  return patterns;
 }
 
 }  // namespace
@@ -154,6 +173,7 @@ pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const Motor
   const driver::Timing timing = config.timing();
   channel.both_edges = config.stepsOnBothEdges();
   channel.dir_steps = lines.cw_ccw;
+  channel.patterns = patternsOf(config);
   channel.step_high = timing.step_high_ns;
   channel.step_low = timing.step_low_ns;
   channel.dir_setup = timing.dir_setup_ns;

@@ -26,6 +26,7 @@ struct ChipLines {
   int endstop_max = -1;
   int fault = -1;
   int in_position = -1;
+  std::array<int, pulse::kCoils> coils = {-1, -1, -1, -1};
 };
 
 /// An input with a name that an axis uses, without being its owner.
@@ -42,6 +43,8 @@ struct MotorLines : ChipLines {
   std::optional<SensorLine> homing_input;  ///< of HomingConfig::input
   std::optional<SensorLine> homing_flag;   ///< of HomingConfig::flag
 
+  /// Its motors have coils that are switched by lines.
+  bool hasCoils() const { return coils.front() >= 0; }
   std::size_t motors() const { return 1 + twins.size(); }
   const ChipLines& motorAt(std::size_t index) const {
     return index == 0 ? *this : twins[index - 1];

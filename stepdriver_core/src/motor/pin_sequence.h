@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 
 #include "channel/channel_config.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -21,6 +22,9 @@ struct PinSequence {
   static constexpr std::size_t kCapacity = 8 * pulse::kMostMotors;
   std::array<Write, kCapacity> writes{};
   std::size_t size = 0;
+  /// Afterwards, if lines switch the coils of the motors, whether these have current. The pulse
+  /// thread writes them, because the steps are writes of them too.
+  std::optional<bool> coils;
 
   /// @throw std::out_of_range beyond kCapacity.
   void add(int line, bool level, pulse::Nanoseconds then_wait) {
@@ -30,6 +34,7 @@ struct PinSequence {
   /// @throw std::out_of_range beyond kCapacity.
   void append(const PinSequence& other) {
     for (std::size_t i = 0; i < other.size; ++i) writes.at(size++) = other.writes[i];
+    if (other.coils) coils = other.coils;
   }
 };
 

@@ -7,9 +7,12 @@
 
 namespace stepdriver::motor {
 
-bool Translator::isAtHome(std::int64_t count) const {
+bool Translator::isAtHome(std::int64_t count) const { return placeAt(count) == 0; }
+
+std::int64_t Translator::placeAt(std::int64_t count) const {
   const std::int64_t cycle = static_cast<std::int64_t>(driver::kFullStepsPerCycle) * microsteps_;
-  return (count - home_count_) % cycle == 0;
+  const std::int64_t place = (count - home_count_) % cycle;
+  return place < 0 ? place + cycle : place;
 }
 
 std::int64_t Translator::nearestCommon(std::int64_t count, int wanted) const {

@@ -14,6 +14,8 @@ class Translator {
 
   /// Whether the translator is at Home at this count.
   bool isAtHome(std::int64_t count) const;
+  /// [microsteps] Its place in the electrical cycle at this count, from Home.
+  std::int64_t placeAt(std::int64_t count) const;
   /// It has gone Home, with the motor at this count.
   void wentHome(std::int64_t count) { home_count_ = count; }
 

@@ -115,9 +115,9 @@ class StepPort {
   StepPort& operator=(const StepPort&) = delete;
 
   /// @param listener outlives the port; set before the first step.
-  void listen(Listener& listener) { listener_ = &listener; }
+  virtual void listen(Listener& listener) { listener_ = &listener; }
 
-  const Lane& lane(std::size_t channel) const { return lanes_[channel]; }
+  virtual const Lane& lane(std::size_t channel) const { return lanes_[channel]; }
   std::size_t lanes() const { return lanes_.size(); }
 
   /// How long before its time a step is put, at most. Until then it isn't given back unless the
@@ -159,6 +159,13 @@ class StepPort {
   /// now in this call, without a word; by others as soon as the hardware has answered, which plays
   /// what is due until then. No step of the channel may be put while one is open.
   virtual void takeBack(std::size_t channel) = 0;
+
+  /// Switches the current of the coils of a channel whose motors have ChannelConfig::patterns.
+  ///
+  /// @pre No step of it is open. @return the line that failed; other lines have been written.
+  virtual LineFailure setCurrent(std::size_t /*channel*/, const CoilCurrent& /*current*/) {
+    return {};
+  }
 
   /// Does what is due, and tells the listener what has happened since the last call. @param now
   ///   clock time.

@@ -54,9 +54,9 @@ class CallMeter {
 
   CallCosts measure(const ChannelConfig& channel) {
     CallCosts costs;
-    const gpio::LineWrite at_rest{channel.step.line, !channel.step.active};
-    costs.write =
-        costOf(lines_.outputName(channel.step.line), [&] { return lines_.write(&at_rest, 1); });
+    const Signal& step = channel.patterns.empty() ? channel.step : channel.coils.front();
+    const gpio::LineWrite at_rest{step.line, !step.active};
+    costs.write = costOf(lines_.outputName(step.line), [&] { return lines_.write(&at_rest, 1); });
     for (const auto& endstop : {channel.endstop_min, channel.endstop_max}) {
       if (!endstop) continue;
       const Spread read = costOf(lines_.inputName(endstop->line),

@@ -123,6 +123,8 @@ struct Command {
     double backlash = 0.0;
   };
   std::optional<Scale> scale;  ///< for kRelease
+  /// For kRelease, if lines switch the coils of the motors: their current from now on.
+  std::optional<CoilCurrent> coils;
 };
 
 }  // namespace stepdriver::pulse

@@ -35,6 +35,11 @@ EngineChannel* Kin::axisOf(EngineChannel& channel) {
   return axes[static_cast<std::size_t>(place) % axes.size()];
 }
 
+EngineChannel& Kin::motorOf(EngineChannel& axis) {
+  const auto place = std::find(axes.begin(), axes.end(), &axis) - axes.begin();
+  return *all[all.size() - axes.size() + static_cast<std::size_t>(place)];
+}
+
 void SumKin::stepped(EngineChannel& channel, const PlayedStep& step) {
   channel.publishStep(step);
   for (std::size_t i = 0; i < axes.size(); ++i) {

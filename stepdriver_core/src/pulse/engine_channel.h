@@ -44,6 +44,8 @@ class Kin {
   bool isBusy() const;      ///< a pulse is out, or a step is open
   /// The axis whose chip has the motor of a channel. For the channel of an axis it is this axis.
   EngineChannel* axisOf(EngineChannel& channel);
+  /// The channel of the motor that has the chip of an axis.
+  EngineChannel& motorOf(EngineChannel& axis);
 
   std::vector<EngineChannel*> axes;  ///< what objects to a step, or ends, is theirs
   std::vector<EngineChannel*> all;   ///< a step of one may be what another one waits for

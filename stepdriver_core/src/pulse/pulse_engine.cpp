@@ -7,7 +7,7 @@
 
 #include "engine_channel.h"
 #include "engine_output.h"
-#include "port/gpio_port.h"
+#include "port/line_ports.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::pulse {
@@ -40,6 +40,8 @@ ChannelConfig motorOf(const ChannelConfig& axis) {
   motor.dir = axis.dir;
   motor.dir_steps = axis.dir_steps;
   motor.both_edges = axis.both_edges;
+  motor.coils = axis.coils;
+  motor.patterns = axis.patterns;
   motor.step_high = axis.step_high;
   motor.step_low = axis.step_low;
   motor.dir_setup = axis.dir_setup;
@@ -106,9 +108,7 @@ PulseEngine::PulseEngine(StepPort* port, gpio::Lines& lines, Clock& clock,
                          const std::vector<SharedAxes>& shared)
     : lines_(lines),
       clock_(clock),
-      own_port_(port != nullptr
-                    ? nullptr
-                    : std::make_unique<GpioPort>(lines_, clock, lanesOf(channels, shared))),
+      own_port_(port != nullptr ? nullptr : makeLinePort(lines_, clock, lanesOf(channels, shared))),
       port_(port != nullptr ? *port : *own_port_),
       horizon_(port_.horizon()),
       max_lateness_(max_lateness),
@@ -279,6 +279,7 @@ void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
   } else if (command.kind == Command::Kind::kBlocked) {
     if (channel.kin->follows()) end(channel, EndReason::kBlocked, now);
   } else if (command.kind == Command::Kind::kRelease) {
+    if (command.coils) setCurrent(channel, *command.coils, now);
     channel.release(command);
     for (const auto& output : outputs_) {
       // Its places were counts of the mode before.
@@ -292,6 +293,11 @@ void PulseEngine::takeCommand(const Command& command, Nanoseconds now) {
   channel.state.taken = command.serial;
   channel.publish();
   changed(channel);
+}
+
+void PulseEngine::setCurrent(Channel& channel, const CoilCurrent& current, Nanoseconds now) {
+  const LineFailure failure = port_.setCurrent(channel.kin->motorOf(channel).index, current);
+  if (failure.error != 0) fail(channel, failure, now);
 }
 
 void PulseEngine::followAll(const Command& command, Nanoseconds now) {

@@ -195,6 +195,7 @@ class PulseEngine : private StepPort::Listener {
 
   // Outputs.
   void takeCompare(const Compare& order, Nanoseconds now);
+  void setCurrent(EngineChannel& channel, const CoilCurrent& current, Nanoseconds now);
   bool outputsHaveRoom(const Follow& order) const;
   Nanoseconds serveOutputs(Nanoseconds now);
   void endMarks();

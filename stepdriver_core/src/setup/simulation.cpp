@@ -68,6 +68,10 @@ std::optional<sim::SwitchSpec> switchOf(const std::optional<config::Endstop>& en
 /// The axis as it is really wired.
 AxisConfig wired(AxisConfig axis, const SimulatedWiring& wiring) {
   const bool cw_ccw = axis.hasCwCcwInputs();
+  if (wiring.dir_inverted.value_or(false) && axis.hasPhases()) {
+    std::swap(axis.pins.in1, axis.pins.in4);
+    std::swap(axis.pins.in2, axis.pins.in3);
+  }
   if (wiring.dir_inverted && !cw_ccw) axis.pins.dir.inverted = *wiring.dir_inverted;
   if (wiring.dir_inverted.value_or(false) && cw_ccw) std::swap(axis.pins.step, axis.pins.dir);
   if (wiring.steps_per_unit) {
@@ -142,6 +146,11 @@ sim::RigAxisSpec rigAxisOf(const AxisConfig& configured, const SimulatedAxis& si
   spec.ms3 = wireOf(axis.pins.ms3);
   spec.sleep = wireOf(axis.pins.sleep);
   spec.reset = wireOf(axis.pins.reset);
+  spec.in1 = wireOf(axis.pins.in1);
+  spec.in2 = wireOf(axis.pins.in2);
+  spec.in3 = wireOf(axis.pins.in3);
+  spec.in4 = wireOf(axis.pins.in4);
+  spec.keeps_coils = !axis.disable_on_shutdown;
   spec.microsteps = axis.microsteps;
   spec.full_step_travel =
       axis.microsteps / axis.steps_per_unit * config::configUnitsPerUnit(axis.kind);
@@ -336,7 +345,8 @@ Simulation::Simulation(const std::vector<AxisConfig>& axes,
       faults_[axis.traceName(i)] = simulated.faults;
       rig_.setFaults(axis.traceName(i), simulated.faults);
       if (simulated.fail_step_write_after) {
-        rig_.failWrites(motor.pins.step.line, *simulated.fail_step_write_after, EIO);
+        const config::Pin& pin = motor.hasPhases() ? motor.pins.in1 : motor.pins.step;
+        rig_.failWrites(pin.line, *simulated.fail_step_write_after, EIO);
       }
     }
   }

@@ -1,15 +1,24 @@
 #include "chip_model.h"
 
+#include <algorithm>
+#include <cstdlib>
 #include <numeric>
+#include <utility>
 
 namespace stepdriver::sim {
 namespace {
 
-constexpr std::array<const char*, kPinCount> kPinNames{"step", "dir", "enable", "ms1",
-                                                       "ms2",  "ms3", "sleep",  "reset"};
+constexpr std::array<const char*, kPinCount> kPinNames{
+    "step", "dir", "enable", "ms1", "ms2", "ms3", "sleep", "reset", "in1", "in2", "in3", "in4"};
 constexpr std::array<Wire RigAxisSpec::*, kPinCount> kWires{
     &RigAxisSpec::step, &RigAxisSpec::dir, &RigAxisSpec::enable, &RigAxisSpec::ms1,
-    &RigAxisSpec::ms2,  &RigAxisSpec::ms3, &RigAxisSpec::sleep,  &RigAxisSpec::reset};
+    &RigAxisSpec::ms2,  &RigAxisSpec::ms3, &RigAxisSpec::sleep,  &RigAxisSpec::reset,
+    &RigAxisSpec::in1,  &RigAxisSpec::in2, &RigAxisSpec::in3,    &RigAxisSpec::in4};
+constexpr std::array<Pin, driver::kCoils> kCoilPins{Pin::kIn1, Pin::kIn2, Pin::kIn3, Pin::kIn4};
+
+bool isCoilPin(Pin pin) {
+  return std::find(kCoilPins.begin(), kCoilPins.end(), pin) != kCoilPins.end();
+}
 
 /// Each mode's microstep is a whole number of the finest one's.
 int finestOf(const RigAxisSpec& spec) {
@@ -53,7 +62,8 @@ ChipModel::ChipModel(const RigAxisSpec& spec)
       declared_microsteps_(spec.microsteps),
       decodes_(!chip_.modes.empty() && wiresModePins(spec)),
       both_edges_(chip_.both_edges),
-      microsteps_(spec.microsteps) {
+      microsteps_(spec.microsteps),
+      keeps_coils_(spec.keeps_coils) {
   const driver::ModeCode straps =
       driver::codeOf(chip_, spec.microsteps).value_or(driver::ModeCode{});
   for (std::size_t i = 0; i < kPinCount; ++i) {
@@ -83,12 +93,18 @@ bool ChipModel::idleLevel(Pin pin, bool wired, const driver::ModeCode& straps) c
       return wired == chip_.sleep_asleep.value_or(false);
     case Pin::kReset:
       return wired == chip_.reset_held.value_or(false);
+    case Pin::kIn1:
+    case Pin::kIn2:
+    case Pin::kIn3:
+    case Pin::kIn4:
+      return false;
   }
   return false;
 }
 
 std::optional<ChipModel::Pulse> ChipModel::request(Pin pin, bool line_level, std::int64_t time_ns) {
   PinState& state = at(pin);
+  if (isCoilPin(pin)) pattern_is_known_ = false;
   if (state.driven) return edge(pin, line_level, time_ns);
   state.driven = true;
   const bool level = line_level != state.inverted;
@@ -122,8 +138,60 @@ std::optional<ChipModel::Pulse> ChipModel::edge(Pin pin, bool line_level, std::i
     case Pin::kReset:
       goHomeIfHeld();
       break;
+    case Pin::kIn1:
+    case Pin::kIn2:
+    case Pin::kIn3:
+    case Pin::kIn4:
+      break;  // coilsWritten() sees all of them
   }
   return std::nullopt;
+}
+
+driver::CoilSet ChipModel::wantedCoils() const {
+  driver::CoilSet coils = 0;
+  for (std::size_t i = 0; i < kCoilPins.size(); ++i) {
+    if (at(kCoilPins[i]).level) coils |= static_cast<driver::CoilSet>(1U << i);
+  }
+  return coils;
+}
+
+std::optional<ChipModel::Pulse> ChipModel::coilsWritten(std::int64_t time_ns) {
+  const driver::CoilSet before = std::exchange(coils_, wantedCoils());
+  if (coils_ == before || coils_ == 0) return std::nullopt;
+  constexpr auto kPlaces = static_cast<std::int64_t>(driver::kHalfSteps.size());
+  const auto& patterns = driver::kHalfSteps;
+  const auto found = std::find(patterns.begin(), patterns.end(), coils_);
+  if (found == patterns.end()) {
+    count(Violation::kUndefinedPattern);
+    return std::nullopt;
+  }
+  const std::int64_t place = found - patterns.begin();
+  const std::int64_t step = finest_ / microsteps_;
+  if (place % step != 0) {
+    count(Violation::kCoilLeftOn);
+    return std::nullopt;
+  }
+  const std::int64_t ahead = place - translator_ + kPlaces / 2;
+  const std::int64_t moved = ahead - kPlaces * floorDivide(ahead, kPlaces) - kPlaces / 2;
+  translator_ += moved;
+  const bool comes = before == 0;
+  if (moved != 0 && (comes ? pattern_is_known_ : std::abs(moved) != step)) {
+    count(Violation::kPatternJump);
+  }
+  pattern_is_known_ = true;
+  if (comes) {
+    coils_on_ns_ = time_ns;
+    return std::nullopt;
+  }
+  if (moved == 0) return std::nullopt;
+  checkTime(step_active_ns_, time_ns, chip_.timing.step_high_ns, Violation::kShortStepHigh);
+  checkTime(coils_on_ns_, time_ns, chip_.timing.enable_ns, Violation::kStepAfterEnable);
+  step_active_ns_ = time_ns;
+  return Pulse{moved > 0, moved};
+}
+
+void ChipModel::released(Pin pin) {
+  if (isCoilPin(pin) && at(pin).level && !keeps_coils_) count(Violation::kCoilLeftOn);
 }
 
 void ChipModel::checkTime(std::int64_t since_ns, std::int64_t time_ns, std::int64_t limit_ns,

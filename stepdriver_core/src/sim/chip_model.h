@@ -12,8 +12,8 @@
 
 namespace stepdriver::sim {
 
-enum class Pin { kStep, kDir, kEnable, kMs1, kMs2, kMs3, kSleep, kReset };
-constexpr std::size_t kPinCount = 8;
+enum class Pin { kStep, kDir, kEnable, kMs1, kMs2, kMs3, kSleep, kReset, kIn1, kIn2, kIn3, kIn4 };
+constexpr std::size_t kPinCount = 12;
 
 /// The name of a pin in traces.
 const char* nameOf(const RigAxisSpec& spec, Pin pin);
@@ -39,6 +39,11 @@ class ChipModel {
 
   /// The pin's line changed to this level.
   std::optional<Pulse> edge(Pin pin, bool line_level, std::int64_t time_ns);
+
+  /// A write has ended: the coils that lines switch have their new current.
+  std::optional<Pulse> coilsWritten(std::int64_t time_ns);
+  /// The line of the pin was released.
+  void released(Pin pin);
 
   /// The level of the pin's line.
   bool lineLevel(Pin pin) const { return at(pin).level != at(pin).inverted; }
@@ -82,7 +87,11 @@ class ChipModel {
 
   PinState& at(Pin pin) { return pins_[static_cast<std::size_t>(pin)]; }
   const PinState& at(Pin pin) const { return pins_[static_cast<std::size_t>(pin)]; }
-  bool enabled() const { return at(Pin::kEnable).level == chip_.enable_on; }
+  bool hasPhases() const { return chip_.step_inputs == driver::StepInputs::kPhases; }
+  bool enabled() const {
+    return hasPhases() ? coils_ != 0 : at(Pin::kEnable).level == chip_.enable_on;
+  }
+  driver::CoilSet wantedCoils() const;
   bool awake() const { return !chip_.sleep_asleep || at(Pin::kSleep).level != *chip_.sleep_asleep; }
   /// It takes STEP into account, whether current flows or not.
   bool counts() const;
@@ -120,6 +129,10 @@ class ChipModel {
   bool outputs_on_ = true;
   bool both_edges_;
   int microsteps_;
+  driver::CoilSet coils_ = 0;      // those that have current
+  bool pattern_is_known_ = false;  // since the lines were requested
+  std::int64_t coils_on_ns_ = kForEver;
+  const bool keeps_coils_;
   int missed_ = 0;
   int doubled_ = 0;
   std::map<Violation, std::int64_t> violations_;

@@ -80,6 +80,9 @@ class Rig::Impl {
       if (twin) throw Error("the rig has two axes named " + spec.name);
       axes.push_back(std::make_unique<RigAxis>(spec, slides));
       wire(*axes.back());
+      if (spec.chip.step_inputs == driver::StepInputs::kPhases) {
+        coil_axes.push_back(axes.back().get());
+      }
     }
     for (const RigCoupling& coupling : couplings) couple(coupling);
     if (motor_power) wire(*motor_power);
@@ -179,6 +182,7 @@ class Rig::Impl {
   std::mutex mutex;
   Slides slides;
   std::vector<std::unique_ptr<RigAxis>> axes;
+  std::vector<RigAxis*> coil_axes;  // those whose motors have coils that are switched by lines
   std::optional<PowerRelay> relay;
   std::map<std::string, SwitchModel> inputs;  // with a name
   TraceFeed feed;
@@ -477,9 +481,20 @@ void Rig::onEdge(int line, bool level, std::int64_t time_ns) {
   impl_->switchesMoved(now_ns);
 }
 
-void Rig::onRelease(int /*line*/, std::int64_t time_ns) {
+void Rig::onWriteEnd(std::int64_t time_ns) {
+  if (impl_->coil_axes.empty()) return;
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::int64_t now_ns = impl_->advance(time_ns);
+  for (RigAxis* axis : impl_->coil_axes) axis->coilsWritten(now_ns);
+  impl_->switchesMoved(now_ns);
+}
+
+void Rig::onRelease(int line, std::int64_t time_ns) {
   const std::lock_guard<std::mutex> lock(impl_->mutex);
   impl_->advance(time_ns);
+  for (const PinOnLine& pin : impl_->at(line).pins) {
+    if (pin.of == PinOnLine::Of::kChip) pin.axis->released(pin.pin);
+  }
 }
 
 bool Rig::inputLevel(int line, std::int64_t time_ns) {

@@ -89,9 +89,14 @@ void RigAxis::request(Pin pin, bool line_level, std::int64_t time_ns) {
 
 void RigAxis::edge(Pin pin, bool line_level, std::int64_t time_ns) {
   advance(time_ns);
-  const bool cw_ccw = spec_.chip.step_inputs == driver::StepInputs::kCwCcw;
-  if (pin == Pin::kDir && !cw_ccw && line_level != chip_.lineLevel(pin)) noteTurn();
+  const bool has_dir = spec_.chip.step_inputs == driver::StepInputs::kStepDir;
+  if (pin == Pin::kDir && has_dir && line_level != chip_.lineLevel(pin)) noteTurn();
   follow(chip_.edge(pin, line_level, time_ns), time_ns);
+}
+
+void RigAxis::coilsWritten(std::int64_t time_ns) {
+  advance(time_ns);
+  follow(chip_.coilsWritten(time_ns), time_ns);
 }
 
 // The next step waits at most for all times of the chip from the last one on.
@@ -102,8 +107,8 @@ void RigAxis::noteTurn() {
 
 void RigAxis::judge(bool forward, std::int64_t time_ns) {
   // Without DIR, only the pulse itself shows the turn.
-  const bool cw_ccw = spec_.chip.step_inputs == driver::StepInputs::kCwCcw;
-  if (cw_ccw && std::exchange(last_forward_, forward) != forward) noteTurn();
+  const bool has_dir = spec_.chip.step_inputs == driver::StepInputs::kStepDir;
+  if (!has_dir && std::exchange(last_forward_, forward) != forward) noteTurn();
   if (!judge_) return;
   const double way = static_cast<double>(spec_.microsteps) / chip_.microsteps();
   const auto violation = judge_->step(forward ? way : -way, time_ns, slides_.total());

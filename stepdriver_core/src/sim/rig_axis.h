@@ -42,6 +42,9 @@ class RigAxis {
 
   void request(Pin pin, bool line_level, std::int64_t time_ns);
   void edge(Pin pin, bool line_level, std::int64_t time_ns);
+  /// A write has ended: of a motor whose coils are switched by lines.
+  void coilsWritten(std::int64_t time_ns);
+  void released(Pin pin) { chip_.released(pin); }
   /// nullptr if there is none.
   const BrakeModel* brake() const { return brake_ ? &*brake_ : nullptr; }
   /// The line of the brake has this level from now on. @pre There is a brake.

@@ -28,6 +28,12 @@ const char* nameOf(Violation violation) {
       return "step too soon after wake-up";
     case Violation::kStepInReset:
       return "step in reset or too soon after it";
+    case Violation::kUndefinedPattern:
+      return "coils that no step has together";
+    case Violation::kPatternJump:
+      return "jump of the pattern of coils";
+    case Violation::kCoilLeftOn:
+      return "coil left on";
     case Violation::kBothInputs:
       return "pulses on CW and CCW at the same time";
     case Violation::kStepIntoSwitch:

@@ -81,6 +81,10 @@ void addLines(const config::AxisConfig& axis, const config::MotorConfig& motor,
   add(numbered_from_0 ? "m2" : "ms3", pins.ms3.line);
   add("sleep", pins.sleep.line);
   add("reset", pins.reset.line);
+  add("in1", pins.in1.line);
+  add("in2", pins.in2.line);
+  add("in3", pins.in3.line);
+  add("in4", pins.in4.line);
   if (motor.endstop_min) add("endstops/min", motor.endstop_min->line);
   if (motor.endstop_max) add("endstops/max", motor.endstop_max->line);
   if (motor.fault) add("fault", motor.fault->line);

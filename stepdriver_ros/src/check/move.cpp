@@ -33,7 +33,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
   const config::AxisConfig& config = axis.config();
   const machine::EngineFigures before = machine.figures();
   axis.setPosition(startFor(config, stroke));
-  if (config.pins.enable.wired()) axis.enable(true);
+  if (config.hasSwitchedCurrent()) axis.enable(true);
   const double start = axis.state().position;
   const axis::MoveResult forth = axis.wait(axis.moveTo(stroke, true));
   say(fmt::format("  {}: out: {}", config.name, forth.message));
@@ -53,7 +53,7 @@ bool moveAxis(machine::Machine& machine, axis::Axis& axis, double stroke, const 
       after.pulses - before.pulses, after.slips - before.slips,
       roundedText(after.worst_lateness * 1e6),
       off == 0.0 ? "back where it was" : lengthText(config, off) + " from where it was"));
-  if (config.pins.enable.wired()) axis.enable(false);
+  if (config.hasSwitchedCurrent()) axis.enable(false);
   return reached && off == 0.0;
 }
 
@@ -95,7 +95,7 @@ bool moveForthAndBack(const MoveOrder& order, gpio::Backend& backend, pulse::Clo
       all_back = moveAxis(machine, *axis, stroke, say) && all_back;
     } catch (const Refused& refused) {
       say(std::string("  ") + refused.what());
-      if (!watch.interrupted() && axis->config().pins.enable.wired()) axis->enable(false);
+      if (!watch.interrupted() && axis->config().hasSwitchedCurrent()) axis->enable(false);
       all_back = false;
     }
   }

@@ -10,7 +10,7 @@ using test::kPi;
 
 const std::string kDrivers =
     "a4988, drv8825, tb6600, tmc2208, tmc2209, tmc2226, tmc2130, tmc5160, drv8434, lv8729, tb6560, "
-    "dm542, dm556, cl57t or step_dir";
+    "dm542, dm556, cl57t, uln2003 or step_dir";
 
 TEST(ReadAxes, ReadsAWholeLinearA4988) {
   ConfigValue axis = linearAxis();

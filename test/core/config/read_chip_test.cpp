@@ -231,7 +231,7 @@ TEST(ReadChip, TakesCwAndCcwInsteadOfStepAndDir) {
                        "is \"both\", but each edge can be a step only on a STEP input, not on CW "
                        "and CCW"},
                       {"chip/step_inputs", "cw",
-                       "is \"cw\", but must be step_dir or cw_ccw; did you mean cw_ccw?"}});
+                       "is \"cw\", but must be step_dir, cw_ccw or phases; did you mean cw_ccw?"}});
   put(axis, "common_anode", true);
   EXPECT_EQ(issuesOfX(axis), lineOfX("invert/ccw", "is true, but common_anode inverts it already"));
   expectIssues(linearAxis(), {{"pins/cw", "C",

@@ -133,7 +133,7 @@ TEST(Chip, IsFoundByTheNameInConfigurations) {
   EXPECT_EQ(driverChipNames(),
             (std::vector<std::string>{"a4988", "drv8825", "tb6600", "tmc2208", "tmc2209", "tmc2226",
                                       "tmc2130", "tmc5160", "drv8434", "lv8729", "tb6560", "dm542",
-                                      "dm556", "cl57t"}));
+                                      "dm556", "cl57t", "uln2003"}));
   for (const std::string& name : driverChipNames()) {
     ASSERT_NE(findDriverChip(name), nullptr) << name;
     EXPECT_EQ(findDriverChip(name), &driverChip(name)) << name;
@@ -167,7 +167,8 @@ TEST(Chip, KeepsTheTimingOfItsDatasheet) {
       {"tb6560", 30'000, 37'000, 15'000, 0, 200'000'000, 0},
       {"dm542", 2'500, 2'500, 5'000, 0, 200'000'000, 0},
       {"dm556", 2'500, 2'500, 5'000, 0, 200'000'000, 0},
-      {"cl57t", 2'500, 2'500, 5'000, 0, 500'000'000, 0}};
+      {"cl57t", 2'500, 2'500, 5'000, 0, 500'000'000, 0},
+      {"uln2003", 1'000, 1'000, 0, 0, 10'000'000, 0}};
   EXPECT_EQ(datasheets.size(), driverChipNames().size());
   for (const TimingFigures& sheet : datasheets) {
     const DriverChip& chip = driverChip(sheet.chip);
@@ -205,7 +206,8 @@ TEST(Chip, KnowsItsPinsAndTheirLevels) {
       {"drv8434", 'H', 'L', '-', 'L', held},   {"lv8729", 'L', 'L', '-', '-', held},
       {"tb6560", 'L', '-', '-', '-', held},    {"dm542", 'L', '-', '-', '-', held},
       {"dm556", 'L', '-', '-', '-', held},     {"cl57t", 'L', '-', '-', 'H', held},
-      {"tmc2226", 'L', '-', '-', 'H', counts}, {"tmc5160", 'L', '-', '-', '-', counts}};
+      {"tmc2226", 'L', '-', '-', 'H', counts}, {"tmc5160", 'L', '-', '-', '-', counts},
+      {"uln2003", 'L', '-', '-', '-', held}};
   EXPECT_EQ(datasheets.size(), driverChipNames().size());
   for (const LevelFigures& sheet : datasheets) {
     const DriverChip& chip = driverChip(sheet.chip);
@@ -216,6 +218,20 @@ TEST(Chip, KnowsItsPinsAndTheirLevels) {
     EXPECT_EQ(letterOf(chip.fault_active), sheet.fault) << chip.title;
     EXPECT_EQ(chip.disabled, sheet.disabled) << chip.title;
     EXPECT_EQ(chip.asleep, TranslatorState::kHome) << chip.title;
+  }
+}
+
+TEST(Chip, HasPatternsOfCoilsInWhichOneChangesAtEachHalfStep) {
+  const DriverChip& chip = driverChip("uln2003");
+  EXPECT_EQ(chip.step_inputs, StepInputs::kPhases);
+  EXPECT_TRUE(chip.both_edges);
+  EXPECT_EQ(chip.microsteps, (std::vector<int>{1, 2}));
+  for (std::size_t i = 0; i < kHalfSteps.size(); ++i) {
+    const unsigned changes = kHalfSteps.at(i) ^ kHalfSteps.at((i + 1) % kHalfSteps.size());
+    EXPECT_EQ(changes & (changes - 1), 0U) << i;
+    EXPECT_NE(changes, 0U) << i;
+    const unsigned coils = kHalfSteps.at(i);
+    EXPECT_EQ((coils & (coils - 1)) != 0, i % 2 == 0) << "full steps have two coils: " << i;
   }
 }
 

@@ -71,6 +71,11 @@ inline sim::RigAxisSpec rigAxis(const config::AxisConfig& config) {
   spec.ms3 = wire(config.pins.ms3);
   spec.sleep = wire(config.pins.sleep);
   spec.reset = wire(config.pins.reset);
+  spec.in1 = wire(config.pins.in1);
+  spec.in2 = wire(config.pins.in2);
+  spec.in3 = wire(config.pins.in3);
+  spec.in4 = wire(config.pins.in4);
+  spec.keeps_coils = !config.disable_on_shutdown;
   spec.microsteps = config.microsteps;
   spec.full_step_travel = 1000.0 * config.microsteps / config.steps_per_unit;
   const auto endstop = [](const std::optional<config::Endstop>& wanted, double position) {

@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Shipped, ShippedConfiguration,
                                          "drv8825.yaml", "gantry.yaml", "pen_plotter.yaml",
                                          "plotter.yaml", "rotary_axis.yaml", "tb6600.yaml",
                                          "tmc2209.yaml", "tmc5160.yaml", "two_axes.yaml",
-                                         "wheel.yaml"));
+                                         "uln2003.yaml", "wheel.yaml"));
 
 }  // namespace
 }  // namespace stepdriver::yaml

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -55,9 +56,14 @@ struct Pin {
 };
 
 /// The lines to the pins of a driver chip. ms1 to ms3 are M0 to M2 on a DRV8825. On a driver with
-/// CW and CCW inputs, step is CW and dir is CCW.
+/// CW and CCW inputs, step is CW and dir is CCW. A driver with driver::StepInputs::kPhases has
+/// in1 to in4 alone.
 struct Pins {
-  Pin step, dir, enable, ms1, ms2, ms3, sleep, reset;
+  Pin step, dir, enable, ms1, ms2, ms3, sleep, reset, in1, in2, in3, in4;
+  /// The pin that switches a coil, by its number from 0.
+  const Pin& coil(std::size_t number) const {
+    return *std::array<const Pin*, driver::kCoils>{&in1, &in2, &in3, &in4}.at(number);
+  }
 };
 
 /// A switch on an input line: an endstop, or the emergency stop of the whole machine.
@@ -163,6 +169,10 @@ struct MotorConfig {
   /// decelerates to rest; false: its steps end at once. If one motor has it, all have.
   bool fault_ramps = false;
   std::optional<InPositionPin> in_position;
+  /// Lines switch its current: ENABLE, or those of its coils.
+  bool hasSwitchedCurrent() const { return pins.enable.wired() || hasPhases(); }
+  /// A step is the next pattern of its coils.
+  bool hasPhases() const { return driver.step_inputs == driver::StepInputs::kPhases; }
   /// [unit] Where its home switch closes, relative to HomingConfig::offset, when the motors are
   /// square.
   double offset = 0.0;

@@ -56,7 +56,17 @@ enum class FaultEnd {
 enum class StepInputs {
   kStepDir,  ///< pulses on STEP, in the direction of DIR
   kCwCcw,    ///< pulses on CW are steps forward, pulses on CCW steps backward
+  kPhases,   ///< IN1 to IN4 switch the coils of a motor: a step is their next pattern
 };
+
+/// The inputs of a driver with StepInputs::kPhases, each of a coil.
+constexpr std::size_t kCoils = 4;
+/// Coils that have current, a bit for each: the lowest is that of IN1.
+using CoilSet = std::uint8_t;
+/// The half steps of an electrical cycle, from Home. Those with two coils are the full steps. From
+/// one to the next, a single coil is switched.
+constexpr std::array<CoilSet, 8> kHalfSteps = {0b0011, 0b0010, 0b0110, 0b0100,
+                                               0b1100, 0b1000, 0b1001, 0b0001};
 
 /// A driver chip or a driver box according to its datasheet, wired without inversions.
 ///
@@ -89,7 +99,8 @@ struct DriverChip {
   std::optional<bool> in_position_active;
   std::string in_position_name = "its in-position output";  ///< as in messages: PEND
   StepInputs step_inputs = StepInputs::kStepDir;
-  /// Each edge of STEP is a step; step_high_ns and step_low_ns are the shortest times between them.
+  /// Each edge of STEP, or each change of the pattern of coils, is a step; step_high_ns and
+  /// step_low_ns are the shortest times between them.
   bool both_edges = false;
   TranslatorState disabled = TranslatorState::kHeld;
   TranslatorState asleep = TranslatorState::kHome;

@@ -34,6 +34,10 @@ class Board {
   /// level.
   virtual void onEdge(int line, bool level, std::int64_t time_ns) = 0;
 
+  /// All edges of one write, or of a request, have been told. A board on which the lines of one
+  /// write act together overrides this.
+  virtual void onWriteEnd(std::int64_t time_ns);
+
   /// The output was released. Its last edge, if any, was to the safe level.
   virtual void onRelease(int line, std::int64_t time_ns) = 0;
 

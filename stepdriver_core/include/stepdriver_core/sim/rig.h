@@ -138,7 +138,9 @@ struct RigAxisSpec {
   std::string name;
   driver::DriverChip chip;  ///< its times are what counts as a violation
   /// On a chip with CW and CCW inputs, step is CW and dir is CCW.
-  Wire step, dir, enable, ms1, ms2, ms3, sleep, reset;
+  Wire step, dir, enable, ms1, ms2, ms3, sleep, reset, in1, in2, in3, in4;
+  /// The lines may keep the coils' current when they are released.
+  bool keeps_coils = false;
   int microsteps = 1;             ///< the DIP switches, or how unwired microstep pins are strapped
   double full_step_travel = 0.0;  ///< [mm|deg] travel of the carriage per full step; above 0
   double start = 0.0;             ///< [mm|deg] where the carriage stands when the rig is made
@@ -211,9 +213,12 @@ enum class Violation {
   kStepWhileDisabled,  ///< whether the chip counts it or not
   kStepAfterEnable,    ///< before the enable time is over
   kStepWhileAsleep,
-  kStepAfterWake,  ///< before the wake-up time is over
-  kStepInReset,    ///< while RESET is held, or before the time after it is over
-  kBothInputs,     ///< a pulse on CW while CCW is active, or the other way round
+  kStepAfterWake,     ///< before the wake-up time is over
+  kStepInReset,       ///< while RESET is held, or before the time after it is over
+  kUndefinedPattern,  ///< coils that no step has together
+  kPatternJump,       ///< the next pattern isn't that of a step before or behind
+  kCoilLeftOn,        ///< a single coil of full steps, or a current when the lines are released
+  kBothInputs,        ///< a pulse on CW while CCW is active, or the other way round
   /// A step towards a switch that is active, unless it was read as inactive since the step before.
   /// An axis of a RigCoupling may get about a microstep further: motors that stop it together make
   /// their steps one after the other.
@@ -283,7 +288,9 @@ struct RigFaults {
 /// rotor. When current starts to flow, the rotor snaps to the nearest position with the
 /// translator's phase, a multiple of an electrical cycle away from the translator's own count. DIR
 /// high at the chip is forward: the carriage's position grows. On a chip with CW and CCW inputs,
-/// pulses on CW are forward, and those on CCW backward. While a brake is engaged the rotor doesn't
+/// pulses on CW are forward, and those on CCW backward. Lines that switch the coils of a motor act
+/// together at the end of their write: current flows while any of them is on, and a pulse is a step
+/// to another pattern. While a brake is engaged the rotor doesn't
 /// turn; when it is released, the rotor snaps as above. A load turns the rotor back while neither
 /// current nor the brake holds it. Without motor power no current flows in any axis; when the power
 /// comes, each chip begins with its translator at the nearest Home.
@@ -390,6 +397,7 @@ class Rig : public gpio::Board {
   int lineIndex(const std::string& line) override;
   void onRequest(int line, bool level, std::int64_t time_ns) override;
   void onEdge(int line, bool level, std::int64_t time_ns) override;
+  void onWriteEnd(std::int64_t time_ns) override;
   void onRelease(int line, std::int64_t time_ns) override;
   bool inputLevel(int line, std::int64_t time_ns) override;
   int writeFault(int line, std::int64_t time_ns) override;

@@ -237,6 +237,10 @@ class BoardBackend::HeldLines final : public gpio::Lines {
 
   BoardPort::Channel channelOf(const pulse::ChannelConfig& lane, std::set<int>& steps) {
     BoardPort::Channel channel;
+    if (!lane.patterns.empty()) {
+      refuse(outputs_.at(static_cast<std::size_t>(lane.coils.front().line)).name,
+             "switches a coil, but the other motors are on boards, which play pulses only");
+    }
     const Output& step = outputs_.at(static_cast<std::size_t>(lane.step.line));
     channel.line = lane.step.line;
     channel.board = step.board;

@@ -38,6 +38,10 @@ void invertDirection(Map& axis) {
   if (pins != nullptr && pins->count("cw") > 0 && pins->count("ccw") > 0) {
     return std::swap((*pins)["cw"], (*pins)["ccw"]);
   }
+  if (pins != nullptr && pins->count("in1") > 0 && pins->count("in4") > 0) {
+    std::swap((*pins)["in1"], (*pins)["in4"]);
+    return std::swap((*pins)["in2"], (*pins)["in3"]);
+  }
   Map& invert = below(axis, "invert");
   const bool* const inverted = invert["dir"].as<bool>();
   invert["dir"] = inverted == nullptr || !*inverted;
@@ -83,6 +87,19 @@ void scale(Map& axis, double factor) {
   axis["gear_ratio"] = rounded(numberAt(axis, "gear_ratio").value_or(1.0) * factor);
 }
 
+/// What invertDirection() has done.
+const char* turnText(driver::StepInputs inputs) {
+  switch (inputs) {
+    case driver::StepInputs::kStepDir:
+      break;
+    case driver::StepInputs::kCwCcw:
+      return "pins/cw and pins/ccw are swapped";
+    case driver::StepInputs::kPhases:
+      return "pins/in1 and pins/in4, and pins/in2 and pins/in3, are swapped";
+  }
+  return "invert/dir is changed";
+}
+
 }  // namespace
 
 ConfigValue corrected(ConfigValue parameters, const Findings& findings) {
@@ -99,9 +116,7 @@ std::vector<std::string> changesText(const Findings& findings, const config::Axi
   std::vector<std::string> changes;
   const std::string& axis = findings.axis;
   if (findings.wrong_way) {
-    const bool cw_ccw = config.hasCwCcwInputs();
-    changes.push_back(axis +
-                      (cw_ccw ? ": pins/cw and pins/ccw are swapped" : ": invert/dir is changed") +
+    changes.push_back(axis + ": " + turnText(config.driver.step_inputs) +
                       ", because its plus was your minus");
   }
   if (findings.min_inverted) {
