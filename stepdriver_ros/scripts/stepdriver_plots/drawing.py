@@ -3,6 +3,7 @@
 import math
 
 from .errors import BadDrawing, refuse_endless
+from .stroke import Stroke
 from .svg_path import read_svg
 
 MARGIN = 0.05  # part of the smaller side that stays free if a drawing is fitted into the axes' limits
@@ -14,10 +15,10 @@ def read_drawing(path):
     if path.suffix.lower() == ".svg":
         strokes, in_place = read_svg(path), False
         # In an SVG, y points down; on the axes, it points up.
-        strokes = [[(x, -y) for x, y in stroke] for stroke in strokes]
+        strokes = [stroke.at((x, -y) for x, y in stroke) for stroke in strokes]
     else:
-        strokes, in_place = read_points(path), True
-    strokes = [without_repeats(stroke) for stroke in strokes]
+        strokes, in_place = [Stroke(points) for points in read_points(path)], True
+    strokes = [stroke.at(without_repeats(stroke)) for stroke in strokes]
     if not strokes:
         raise BadDrawing(f"{path}: contains no line")
     return strokes, in_place
@@ -77,9 +78,8 @@ def placed(strokes, limits, scale=None, corner=None):
         scale = min((room / size for room, size in zip(free, sizes) if size > 0.0), default=1.0)
     if corner is None:
         corner = [(low + high - scale * size) / 2 for (low, high), size in zip(limits, sizes)]
-    there = [[tuple(at + scale * (value - low)
-                    for at, value, (low, _) in zip(corner, point, box)) for point in stroke]
-             for stroke in strokes]
+    there = [Stroke((tuple(at + scale * (value - low) for at, value, (low, _) in zip(corner, point, box))
+                     for point in stroke), getattr(stroke, "colour", "")) for stroke in strokes]
     if not all(math.isfinite(value) for stroke in there for point in stroke for value in point):
         raise BadDrawing(f"the drawing can't be scaled: it is {sizes[0]:.6g} wide and {sizes[1]:.6g} "
                          "high")

@@ -36,7 +36,7 @@ Box = namedtuple("Box", "x y width height")  # [px]
 
 
 def read_svg(path):
-    """Strokes: lists of points (x, y), with y pointing down, in mm if the file has a physical size,
+    """Strokes with their colours: points (x, y), with y pointing down, in mm if the file has a physical size,
     otherwise in px. A stroke of one point is a dot."""
     try:
         import svgelements  # noqa: F401: svg_shapes uses it
@@ -47,7 +47,7 @@ def read_svg(path):
         root = parsed(path)
         page = Page(path, root)
         unit = MM_PER_PX if is_physical(root) else 1.0
-        return [[(x * unit, y * unit) for x, y in stroke] for stroke in page.strokes()]
+        return [stroke.at((x * unit, y * unit) for x, y in stroke) for stroke in page.strokes()]
     except (OSError, xml.ParseError, LookupError, ValueError, TypeError, AttributeError,
             ArithmeticError) as error:
         raise BadDrawing(f"{path}: can't be read as SVG: {error}") from error
@@ -130,8 +130,8 @@ class Page:
         strokes = Shapes(self._path, large_root).strokes()
         if is_clipped and not all(leaning.is_on_page(point) for stroke in strokes for point in stroke):
             page = Region([leaning.corners()], False, MARGIN)
-            strokes = [part for stroke in strokes for part in page.cut(stroke)]
-        return [[leaning.back(point) for point in stroke] for stroke in strokes]
+            strokes = [stroke.at(part) for stroke in strokes for part in page.cut(stroke)]
+        return [stroke.at(leaning.back(point) for point in stroke) for stroke in strokes]
 
 
 class Leaning:

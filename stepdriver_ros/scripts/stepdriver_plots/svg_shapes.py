@@ -2,9 +2,11 @@
 
 import itertools
 import math
+import re
 from collections import namedtuple
 
 from .errors import BadDrawing
+from .stroke import Stroke
 from .svg_clip import Region
 
 # A curve becomes chords. Their largest distance from the curve is this part of the drawing's diagonal:
@@ -12,10 +14,11 @@ from .svg_clip import Region
 TOLERANCE = 1e-4
 MARGIN = 0.5  # [px] points that are closer count as one, and the edge of a clip is exact to this
 HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
+PERCENT = re.compile(r"rgb\(([\d.]+)%,([\d.]+)%,([\d.]+)%\)")
 NOT_SHOWN = {"defs", "clipPath", "mask", "filter", "linearGradient", "radialGradient", "pattern", "symbol"}
 
-# element: a path or a rect; matrix: its transform; clips: Clips
-Shape = namedtuple("Shape", "element matrix clips is_white has_dots")
+# element: a path or a rect; matrix: its transform; clips: Clips; colour: of its stroke or else its fill
+Shape = namedtuple("Shape", "element matrix clips is_white has_dots colour")
 Clip = namedtuple("Clip", "element matrix style")
 
 
@@ -34,7 +37,7 @@ class Shapes:
         self._shapes = list(itertools.dropwhile(lambda shape: shape.is_white, shapes))
 
     def strokes(self):
-        """Lists of points [px]. A list of one point is a dot."""
+        """Strokes with their colours [px]."""
         outlines = [self._outline(shape.element, shape.matrix) for shape in self._shapes]
         points = [place for outline in outlines for segment in outline for place in places_of(segment)]
         if not points:
@@ -44,8 +47,10 @@ class Shapes:
         for shape, outline in zip(self._shapes, outlines):
             own = self._clipped(visible(chords_of(outline, tolerance), shape.has_dots), shape.clips)
             # A fill and its stroke may be two shapes with the same outline.
-            if not are_same(own, before):
-                strokes += own
+            if own and are_same(own, before):
+                strokes[-len(own):] = [Stroke(stroke, shape.colour) for stroke in own]
+            else:
+                strokes += [Stroke(stroke, shape.colour) for stroke in own]
             before = own
         return strokes
 
@@ -105,7 +110,7 @@ class Shapes:
             self._refuse_image()
         is_white = all(paint == "rgb(100%,100%,100%)" for paint in paints)
         has_dots = style.get("stroke", "none") != "none" and style.get("stroke-linecap") != "butt"
-        return Shape(element, matrix, clips, is_white, has_dots)
+        return Shape(element, matrix, clips, is_white, has_dots, colour_of(paints[-1]) if paints else "")
 
     def _outline(self, element, matrix):
         if name_of(element) == "rect":
@@ -144,6 +149,12 @@ def style_of(element):
     """The versions with cairo 1.16 write a style, later ones attributes."""
     pairs = (pair.partition(":") for pair in element.get("style", "").split(";"))
     return {**element.attrib, **{key.strip(): value.strip() for key, _, value in pairs}}
+
+
+def colour_of(paint):
+    """#rrggbb; empty of what isn't one colour. librsvg writes percent."""
+    shares = PERCENT.fullmatch(paint)
+    return "#" + "".join(f"{round(2.55 * float(share)):02x}" for share in shares.groups()) if shares else ""
 
 
 def visible(strokes, has_dots):
