@@ -55,6 +55,21 @@ class PinTraceTest(unittest.TestCase):
         self.assertEqual(trace.counts("x")[1], [1, 2, 1])
         self.assertEqual(trace.counts("x", False, False)[1], [1, 2, 1])
 
+    def test_counts_the_steps_of_a_motor_whose_coils_are_switched(self):
+        def recorded(patterns):
+            text = "$timescale 1us $end\n$scope module x $end\n"
+            text += "".join(f"$var wire 1 {name} in{i} $end\n" for i, name in enumerate("abcd", 1))
+            text += "$upscope $end\n$enddefinitions $end\n"
+            for number, pattern in enumerate(patterns):
+                text += f"#{10 * number}\n" + "".join(f"{level}{name}\n" for level, name in zip(pattern, "abcd"))
+            return self.trace(text)
+        half = recorded(["0000", "1100", "0100", "0110", "0100", "0000", "0100", "1100", "1000"])
+        self.assertEqual(half.axes(), ["x"])
+        self.assertEqual(half.counts("x")[1], [1, 2, 1, 0, -1])
+        self.assertAlmostEqual(half.counts("x")[0][-1], 80e-6, delta=1e-12)
+        full = recorded(["1100", "0110", "0011", "1001", "1100", "1001"])
+        self.assertEqual(full.counts("x")[1], [1, 2, 3, 4, 3])
+
     def test_counts_each_edge_if_the_file_says_that_it_is_a_step(self):
         text = vcd((0, 1), [(10, "a", 1), (20, "a", 0), (30, "b", 0), (40, "a", 1)])
         told = text.replace("$enddefinitions", "$comment x.step active both $end\n$enddefinitions")

@@ -3,6 +3,12 @@
 from .errors import BadTrace, refuse_endless
 
 
+COILS = ("in1", "in2", "in3", "in4")
+# The coils that have current at each half step of a motor of phases.
+HALF_STEPS = ((1, 1, 0, 0), (0, 1, 0, 0), (0, 1, 1, 0), (0, 0, 1, 0), (0, 0, 1, 1), (0, 0, 0, 1), (1, 0, 0, 1),
+              (1, 0, 0, 0))
+
+
 class PinTrace:
     """The pins of a VCD file: for each axis and pin, its first level and its edges."""
 
@@ -24,10 +30,11 @@ class PinTrace:
             raise BadTrace(f"{path} isn't a VCD file: it has no $timescale, or no $var")
 
     def axes(self):
-        """The names of the axes whose STEP and DIR lines, or CW and CCW lines, both have a level."""
+        """The names of the axes whose STEP and DIR lines, CW and CCW lines, or IN1 to IN4 all have a level."""
         return [axis for axis, pin in self.levels
                 if (pin == "step" and (axis, "dir") in self.levels) or
-                (pin == "cw" and (axis, "ccw") in self.levels)]
+                (pin == "cw" and (axis, "ccw") in self.levels) or
+                (pin == COILS[0] and all((axis, coil) in self.levels for coil in COILS))]
 
     def counts(self, axis, invert_step=None, invert_dir=None):
         """The times [s] of the steps, and the count after each; each time is later than the one before.
@@ -37,6 +44,8 @@ class PinTrace:
         if (axis, "cw") in self.levels:
             return self._counts(axis, self._pulses(axis, "cw", 1, invert_step) +
                                 self._pulses(axis, "ccw", -1, invert_dir))
+        if (axis, COILS[0]) in self.levels:
+            return self._counts(axis, self._patterns(axis))
         active = self.active.get((axis, "step"), not self.levels[axis, "step"])
         if invert_step is not None:
             active = not invert_step
@@ -52,6 +61,32 @@ class PinTrace:
             elif level == active or (axis, "step") in self.both_edges:
                 steps.append((time, 1 if direction == forward else -1))
         return self._counts(axis, steps)
+
+    def _patterns(self, axis):
+        """The times of the steps of a motor whose coils are switched. What comes in between the two writes of a
+        kernel counts as well, at the time of the second one."""
+        changes = sorted((time, coil, level) for coil in COILS for time, level in self.edges[axis, coil])
+        levels = {coil: self.levels[axis, coil] for coil in COILS}
+        moves, before = [], self._place(axis, levels)
+        for number, (time, coil, level) in enumerate(changes):
+            levels[coil] = level
+            if number + 1 < len(changes) and changes[number + 1][0] == time:
+                continue
+            place = self._place(axis, levels)
+            if place is None:
+                before = before if any(self._is_on(axis, levels)) else None
+            elif before not in (None, place):
+                moves.append((time, (place - before + 4) % 8 - 4))
+            before = before if place is None else place
+        full = all(way % 2 == 0 for _, way in moves)
+        return [(time, way // 2 if full else way) for time, way in moves]
+
+    def _is_on(self, axis, levels):
+        return [int(levels[coil] == self.active.get((axis, coil), True)) for coil in COILS]
+
+    def _place(self, axis, levels):
+        on = tuple(self._is_on(axis, levels))
+        return HALF_STEPS.index(on) if on in HALF_STEPS else None
 
     def _pulses(self, axis, pin, way, inverted):
         """The times of the pulses on a line whose steps all go one way."""

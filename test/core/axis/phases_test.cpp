@@ -11,6 +11,7 @@
 #include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/corexy_bench.h"
 #include "support/temporary_folder.h"
 
 namespace stepdriver {
@@ -179,6 +180,21 @@ TEST(Phases, OfTwoMotorsStepTogether) {
   EXPECT_EQ(coilsOf(bench), coilsOf(bench, "y"));
   EXPECT_EQ(bench.pulses(config.traceName(1)), 155);
   EXPECT_EQ(violationsOf(bench.report(config.traceName(1))), "");
+}
+
+TEST(Phases, MoveAxesThatShareTheirMotors) {
+  std::vector<config::AxisConfig> axes = {coilAxis(2, "x"), coilAxis(2, "y")};
+  test::share(axes, {{1.0, 1.0}, {1.0, -1.0}});
+  Bench bench(axes);
+  EXPECT_EQ(bench.move(stepsTo(axes[0], 101), "x").end, MoveEnd::kReached);
+  EXPECT_EQ(bench.move(stepsTo(axes[1], 50), "y").end, MoveEnd::kReached);
+  bench.axis("x").enable(false);
+  EXPECT_EQ(coilsOf(bench, "x") + coilsOf(bench, "y"), "00000000");
+  bench.axis("x").enable(true);
+  EXPECT_EQ(bench.move(stepsTo(axes[0], 0), "x").end, MoveEnd::kReached);
+  EXPECT_EQ(bench.pulses("x"), 50);
+  EXPECT_EQ(bench.pulses("y"), -50);
+  for (const char* name : {"x", "y"}) EXPECT_EQ(violationsOf(bench.report(name)), "") << name;
 }
 
 TEST(Phases, ShareAMachineAndALineWithADriverThatTakesPulses) {
