@@ -276,11 +276,11 @@ class ChipSpeedReader {
   ChipSpeedReader(ConfigReader& motor, const AxisConfig& axis, tmc::Model model)
       : reader_(motor.map("tmc")), axis_(axis), model_(model) {}
 
-  /// @param keyOf its key, by the kind of the axis.
+  /// @param key_of its key, by the kind of the axis.
   /// @return [full steps/s]; empty if it isn't there, or is reported.
-  std::optional<double> read(const char* (*keyOf)(Kind)) {
-    refuseOther(keyOf);
-    const char* const key = keyOf(axis_.kind);
+  std::optional<double> read(const char* (*key_of)(Kind)) {
+    refuseOther(key_of);
+    const char* const key = key_of(axis_.kind);
     const auto speed = reader_.findNumber(key, Range::positive(), Presence::kOptional);
     if (!speed) return {};
     const double least = tmc::lowestThreshold(model_) * fullStepTravel(axis_);
@@ -295,12 +295,12 @@ class ChipSpeedReader {
   ConfigReader& reader() { return reader_; }
 
  private:
-  void refuseOther(const char* (*keyOf)(Kind)) {
-    const char* const other = keyOf(axis_.kind == Kind::kLinear ? Kind::kRotary : Kind::kLinear);
+  void refuseOther(const char* (*key_of)(Kind)) {
+    const char* const other = key_of(axis_.kind == Kind::kLinear ? Kind::kRotary : Kind::kLinear);
     if (!reader_.has(other)) return;
     reader_.contradiction(other, fmt::format("is {}, but the axis's speeds are in {}/s: give {}",
                                              reader_.shown(other), motionKeys(axis_.kind).unit,
-                                             reader_.fullName(keyOf(axis_.kind))));
+                                             reader_.fullName(key_of(axis_.kind))));
   }
 
   ConfigReader reader_;

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -23,7 +24,9 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
+#include "support/tmc_axis.h"
 #include "support/watched_thread.h"
+#include "support/wired_stream.h"
 
 using stepdriver::test::is_watched;
 using stepdriver::test::thread_calls;
@@ -139,14 +142,32 @@ class WatchingLines : public gpio::Lines {
 
 class WatchingBackend : public gpio::Backend {
  public:
-  explicit WatchingBackend(Misdeed misdeed) : misdeed_(misdeed) {}
+  explicit WatchingBackend(Misdeed misdeed) : misdeed_(misdeed) { wire_.add(0); }
   std::unique_ptr<gpio::Lines> request(const std::vector<gpio::OutputRequest>& outputs,
                                        const std::vector<gpio::InputRequest>& inputs) override {
     return std::make_unique<WatchingLines>(misdeed_, outputs, inputs);
   }
+  SerialExchange simulatedSerial(const std::string& /*port*/) override {
+    return [this](const std::uint8_t* bytes, std::size_t count, bool pause) {
+      std::unique_lock<std::mutex> lock(mutex_);
+      fed_.wait(lock, [this] { return !starves_; });
+      if (pause) wire_.wire.pause();
+      return wire_.wire.send(bytes, count);
+    };
+  }
+  /// From now on the thread of the serial port gets no further, or it does again.
+  void starve(bool starves) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    starves_ = starves;
+    fed_.notify_all();
+  }
 
  private:
   const Misdeed misdeed_;
+  test::WiredStream wire_;
+  std::mutex mutex_;
+  std::condition_variable fed_;
+  bool starves_ = false;
 };
 
 /// A machine on the steady clock whose axes get new targets every few milliseconds, while its pulse
@@ -156,8 +177,11 @@ class BusyMachine {
   explicit BusyMachine(Misdeed misdeed)
       : backend_(misdeed), machine_(axes(), backend_, clock_, options()) {}
 
-  // All that a pulse thread does: pulses, targets that follow each other, pins, inputs, stops.
+  // All that a pulse thread does: pulses, targets that follow each other, pins, inputs, stops. The
+  // thread of a driver's UART is starved meanwhile.
   void run() {
+    while (!machine_.axis("y").state().drivers->front().is_set_up) pause();
+    backend_.starve(true);
     for (int i = 0; i < 20; ++i) {
       for (const auto& axis : machine_.axes()) axis->moveTo(i % 2 == 0 ? 0.004 : -0.003);
       (void)machine_.jog({{"x", 0.01, {}}});
@@ -166,6 +190,7 @@ class BusyMachine {
     machine_.stop();
     machine_.axis("y").moveTo(0.1, true);
     awaitPulses(200);
+    backend_.starve(false);
     machine_.emergencyStop();
     machine_.recover();
     for (const auto& axis : machine_.axes()) {
@@ -182,7 +207,10 @@ class BusyMachine {
   static std::vector<config::AxisConfig> axes() {
     std::vector<config::AxisConfig> axes;
     for (const char* name : {"x", "y", "z"}) {
-      axes.push_back(test::linearAxis(name, 80'000.0, 0.06, 0.6));
+      axes.push_back(name == std::string("y") ? test::tmcAxis(name)
+                                              : test::linearAxis(name, 80'000.0, 0.06, 0.6));
+      axes.back().max_speed = 0.06;
+      axes.back().acceleration = axes.back().deceleration = 0.6;
       axes.back().jerk = 25.0;
       axes.back().endstop_min->active_level = axes.back().endstop_max->active_level = true;
       axes.back().align_on_microstep_change = true;
@@ -202,10 +230,9 @@ class BusyMachine {
   // More pulses than now.
   void awaitPulses(std::uint64_t more) {
     const std::uint64_t before = machine_.figures().pulses;
-    while (machine_.figures().pulses < before + more) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
+    while (machine_.figures().pulses < before + more) pause();
   }
+  static void pause() { std::this_thread::sleep_for(std::chrono::milliseconds(1)); }
 
   WatchingBackend backend_;
   pulse::SteadyClock clock_;
