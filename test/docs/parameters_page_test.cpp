@@ -250,7 +250,7 @@ std::vector<Parameter> parametersUnder(const std::string& heading, const std::st
         continue;
       }
       for (const char* pin : {"step", "dir", "cw", "ccw", "enable", "ms1", "ms2", "ms3", "m0", "m1",
-                              "m2", "sleep", "reset"}) {
+                              "m2", "sleep", "reset", "in1", "in2", "in3", "in4"}) {
         parameters.push_back({"axes/x/invert/" + std::string(pin), type, row[2], row[3]});
       }
     }
@@ -433,7 +433,8 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
     const auto value = literal(parameter);
     if (!value) continue;
     const bool unwired = parameter.key.find("invert/m") != std::string::npos ||
-                         parameter.key.find("invert/c") != std::string::npos;
+                         parameter.key.find("invert/c") != std::string::npos ||
+                         parameter.key.find("invert/i") != std::string::npos;
     if (unwired) continue;  // in the bases
     const ConfigValue base =
         parameter.key == "axes/x/gear_ratio" ? scaledByRounds(GetParam()) : GetParam().base;

@@ -274,7 +274,7 @@ class PinsReader {
 
   void refuse(const PinName& name, const std::string& why) {
     for (const char* key : {name.key, name.from_0_key}) {
-      if (key == nullptr || !reader_.has(key)) continue;
+      if (key == nullptr || !readLineName(reader_, key, Presence::kOptional)) continue;
       reader_.contradiction(key, fmt::format("is {}, but {}", reader_.shown(key), why));
     }
   }
