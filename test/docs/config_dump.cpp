@@ -45,7 +45,8 @@ class Dump {
   void add(const config::HomingConfig& homing) {
     all(static_cast<int>(homing.kind), homing.at_max, homing.input, homing.flag, homing.approaches,
         homing.seek_speed, homing.latch_speed, homing.pull_off, homing.final_position,
-        homing.offset, homing.max_travel, homing.timeout, homing.debounce, homing.order);
+        homing.offset, homing.max_travel, homing.timeout, homing.debounce, homing.order,
+        static_cast<int>(homing.check_at_flag), homing.flag_tolerance);
   }
   void add(const driver::Timing& timing) {
     all(timing.step_high_ns, timing.step_low_ns, timing.dir_setup_ns, timing.dir_hold_ns,

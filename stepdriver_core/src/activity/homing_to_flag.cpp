@@ -78,6 +78,10 @@ void HomingToFlag::slowDown() {
 void HomingToFlag::observe() {
   if (!flag_.poll(context())) return;
   passed_.push_back({flag_.active(), placeAt(*flag_.changed())});
+  const int direction = axis_.directionAtTime(context().motionTimeAt(*flag_.changed()));
+  if (has_flag_ && direction != 0) {
+    places_.at(direction, flag_.active()) = passed_.back().place;
+  }
 }
 
 void HomingToFlag::look(bool stroke_has_ended) {
@@ -136,7 +140,10 @@ void HomingToFlag::strokeEnded() {
   if (end == axis::MoveEnd::kEndstopMin || end == axis::MoveEnd::kEndstopMax) {
     return metEndstop(end == axis::MoveEnd::kEndstopMax);
   }
-  if (phase() == HomingPhase::kPullingOff) return succeed(trigger_, 0.0, indexWarning());
+  if (phase() == HomingPhase::kPullingOff) {
+    keepPlaces();
+    return succeed(trigger_, 0.0, indexWarning());
+  }
   if (!slowing_) {
     return failNow(unmet() + " within max_travel, " + axis_.show(config_.max_travel));
   }
@@ -226,6 +233,17 @@ void HomingToFlag::latched() {
       trigger_ = *edge_;
   }
   pullOff(trigger_);
+}
+
+// What passes the flag later is compared with them.
+void HomingToFlag::keepPlaces() {
+  for (const int direction : {-1, 1}) {
+    for (const bool active : {false, true}) {
+      auto& place = places_.at(direction, active);
+      if (place) *place = config_.offset + (*place - trigger_) / axis_.stepsPerUnit();
+    }
+  }
+  axis_.flag_places = places_;
 }
 
 std::string HomingToFlag::indexWarning() const {

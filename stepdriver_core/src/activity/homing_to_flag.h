@@ -56,6 +56,7 @@ class HomingToFlag final : public Homing {
   std::string sensor() const { return "the input " + flag_name_; }
   double turn() const;  // [microsteps] of the motor
   std::string indexWarning() const;
+  void keepPlaces();
 
   const bool has_flag_;
   const std::string flag_name_;
@@ -67,6 +68,7 @@ class HomingToFlag final : public Homing {
   bool returns_ = false;         // it has turned at an endstop before it has met the flag
   std::vector<Edge> passed_;     // edges of the flag in this phase
   std::vector<double> centre_;   // [microsteps] edges for the middle of the flag
+  axis::FlagPlaces places_;      // [microsteps] all edges of the flag that it has passed
   std::optional<double> edge_;   // [microsteps] the flag's
   std::optional<double> index_;  // [microsteps]
   double trigger_ = 0.0;         // [microsteps]

@@ -3,12 +3,6 @@
 #include <algorithm>
 
 namespace stepdriver::activity {
-namespace {
-
-// An edge is reported within this time after another level is read, or it is lost.
-constexpr pulse::Nanoseconds kLongestReport = 5'000'000;
-
-}  // namespace
 
 void InputEdges::begin(const Context& context) {
   input_.begin(context);

@@ -14,6 +14,9 @@ namespace stepdriver::activity {
 /// counts, however short the pulse.
 class InputEdges {
  public:
+  /// An edge is reported within this time after another level is read, or it is lost.
+  static constexpr pulse::Nanoseconds kLongestReport = 5'000'000;
+
   struct Edge {
     bool active = false;
     pulse::Nanoseconds time = 0;  ///< clock time

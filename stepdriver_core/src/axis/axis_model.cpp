@@ -63,6 +63,17 @@ double AxisModel::jointAtTime(std::int64_t at) const {
   return slack ? place - *slack : jointAt(place);
 }
 
+int AxisModel::directionAtTime(std::int64_t at) const {
+  constexpr std::int64_t kAround = 1'000'000;
+  // [microsteps] An axis that moves less in that time passes nothing.
+  constexpr double kLeastWay = 1e-3;
+  const double here = jointAtTime(at);
+  const double before = here - jointAtTime(at - kAround);
+  const double after = jointAtTime(at + kAround) - here;
+  if (before > kLeastWay && after > kLeastWay) return 1;
+  return before < -kLeastWay && after < -kLeastWay ? -1 : 0;
+}
+
 motion::PathAxis AxisModel::pathAxis() const {
   motion::PathAxis facts;
   facts.name = config.name;

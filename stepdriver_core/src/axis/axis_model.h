@@ -10,6 +10,7 @@
 
 #include "axis/axis_memory.h"
 #include "fault.h"
+#include "flag_places.h"
 #include "input_levels.h"
 #include "line_failure.h"
 #include "line_names.h"
@@ -41,6 +42,7 @@ class AxisModel {
   const config::AxisConfig config;
   motor::Motor motor;
   Position position;
+  FlagPlaces flag_places;  ///< those of the last homing, if it was one to a flag
   Fault fault;
   motion::SetpointStream setpoints;
   const MachineMode& mode;
@@ -83,6 +85,9 @@ class AxisModel {
   double jointAt(double motor_count) const;
   /// [microsteps] Where the joint was at a motion time, by its plans. @pre Motor::watchMotions()
   double jointAtTime(std::int64_t at) const;
+  /// 1 or -1: where the joint moved at a motion time; 0: it rested or turned within a millisecond
+  /// of that. @pre Motor::watchMotions()
+  int directionAtTime(std::int64_t at) const;
   double positionNow() const { return positionOf(exactCount()); }
   /// A value with its unit, for messages.
   std::string show(double value, const char* per = "") const { return pathAxis().show(value, per); }
@@ -214,6 +219,11 @@ class AxisModel {
     ++stops;
     position.dropRemainder();
   }
+  /// The machine is on hold from now on, or not any more.
+  void noteHold() {
+    ++stops;
+    ++holds;
+  }
 
   /// The last path of several axes that it has followed to an end; nullptr if there is none.
   std::shared_ptr<const motion::EndedPath> ended_path;
@@ -221,6 +231,8 @@ class AxisModel {
   pulse::Nanoseconds rest_since = 0;
   /// How often something stopped it, other than the end of its motion.
   std::uint64_t stops = 0;
+  /// How many of them were holds, or the ends of holds: then a motion continues.
+  std::uint64_t holds = 0;
   /// AxisState::stopped_by and endstops_met.
   std::string stopped_by;
   std::uint64_t endstops_met = 0;

@@ -15,9 +15,12 @@ class Position {
   /// The position can be trusted.
   bool isValid() const { return valid_; }
   bool isHomed() const { return homed_; }
-  /// Why the position that was kept over a restart can't be trusted; empty if it can, or if there
-  /// is none.
-  const std::string& note() const { return valid_ ? kNothing : note_; }
+  /// Why the position that was kept over a restart can't be trusted, or why one that is trusted
+  /// should not be; empty if there is no such reason.
+  const std::string& note() const {
+    if (valid_) return warning_;
+    return note_;
+  }
 
   /// [unit] The commanded position minus the position of the axis at rest: up to half a microstep
   /// after a move that reached its target, otherwise 0. A relative move counts from the commanded
@@ -31,13 +34,17 @@ class Position {
   /// Something has happened that makes the position of the axis uncertain.
   void distrust() {
     valid_ = homed_ = false;
+    warning_.clear();
     dropRemainder();
   }
+  /// Something says that the position is wrong, but the axis goes on.
+  void warn(std::string why) { warning_ = std::move(why); }
 
   /// A caller declares the position of the axis.
   void declare(double origin) {
     origin_ = origin;
     valid_ = true;
+    warning_.clear();
     dropRemainder();
   }
   void home(double origin) {
@@ -56,18 +63,18 @@ class Position {
     note_ = std::move(doubt);
     valid_ = note_.empty();
     homed_ = valid_ && homed;
+    warning_.clear();
     dropRemainder();
   }
   void setNote(std::string why) { note_ = std::move(why); }
 
  private:
-  inline static const std::string kNothing;
-
   double origin_ = 0.0;
   double remainder_ = 0.0;
   bool valid_ = false;
   bool homed_ = false;
   std::string note_;
+  std::string warning_;
 };
 
 }  // namespace stepdriver::axis

@@ -31,6 +31,8 @@ constexpr double kSlowestStall = 200.0;
 // again before the second approach.
 constexpr double kStallTakes = 4.0;
 const std::vector<std::string> kEnds = {"min", "max"};
+// In the order of FlagCheck.
+const std::vector<std::string> kFlagChecks = {"none", "warning", "fault"};
 
 /// Whether the trigger of the homing lies so far inside the soft limit at its end that the axis,
 /// pulled off, hasn't left the part between the two: no motion gets there, because the switch is an
@@ -79,6 +81,7 @@ class HomingReader {
     if (!isLimit() && !isStall()) readSensor();
     readSpeeds();
     readDistances(has_end);
+    if (!isLimit() && !isStall()) readFlagCheck();
     result_.timeout = homing_.number("timeout_s", {0.0, kLongestTime, true}, result_.timeout);
     if (!isLimit()) return;
     result_.debounce =
@@ -125,6 +128,24 @@ class HomingReader {
       homing_.contradiction("input",
                             "must be the name of an input that reports the block, because "
                             "pins/fault of each motor isn't wired");
+    }
+  }
+
+  void readFlagCheck() {
+    const std::string key = inUnit("check_tolerance");
+    const std::string check = homing_.oneOf("check_at_flag", kFlagChecks, kFlagChecks.front());
+    result_.check_at_flag = static_cast<FlagCheck>(
+        std::find(kFlagChecks.begin(), kFlagChecks.end(), check) - kFlagChecks.begin());
+    const bool checks = result_.check_at_flag != FlagCheck::kNone;
+    const auto tolerance = homing_.findNumber(key, Range::positive(),
+                                              checks ? Presence::kRequired : Presence::kOptional);
+    result_.flag_tolerance = si(tolerance.value_or(0.0));
+    const bool has_flag = result_.kind == HomingKind::kFlag ||
+                          result_.kind == HomingKind::kFlagCentre || !result_.flag.empty();
+    if (checks && !has_flag) {
+      homing_.contradiction("check_at_flag", "is given, but this homing has no flag");
+    } else if (checks && tolerance && result_.flag_tolerance * kSlack < step()) {
+      mustBe(key, fmt::format("at least {}, which is a microstep", lowerBoundText(units(step()))));
     }
   }
 
@@ -331,6 +352,9 @@ std::string homingKey(const char* what, Kind kind) {
 }
 
 const std::string& textOf(HomingKind kind) { return kKinds.at(static_cast<std::size_t>(kind)); }
+const std::string& textOf(FlagCheck check) {
+  return kFlagChecks.at(static_cast<std::size_t>(check));
+}
 
 double restOf(const HomingConfig& homing) {
   if (homing.final_position) return *homing.final_position;

@@ -18,6 +18,8 @@ double restOf(const HomingConfig& homing);
 
 /// The kind as configurations name it: "limit".
 const std::string& textOf(HomingKind kind);
+/// The same of homing/check_at_flag.
+const std::string& textOf(FlagCheck check);
 
 /// Checks that the homings name inputs that are there.
 ///

@@ -182,6 +182,10 @@ class AxisWriter {
     if (is_limit) map["debounce_ms"] = homing.debounce * 1e3;
     if (!homing.input.empty()) map["input"] = homing.input;
     if (!homing.flag.empty()) map["flag"] = homing.flag;
+    if (homing.check_at_flag != FlagCheck::kNone) {
+      map["check_at_flag"] = textOf(homing.check_at_flag);
+      map[key("check_tolerance")] = units(homing.flag_tolerance);
+    }
     if (homing.kind == HomingKind::kBlock) map["approaches"] = homing.approaches;
     if (homing.latch_speed > 0.0) map[key("latch_speed") + "_s"] = units(homing.latch_speed);
     return map;

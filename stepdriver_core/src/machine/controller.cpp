@@ -33,6 +33,9 @@ constexpr pulse::Nanoseconds kAuditPeriod = 1'000'000'000;
 constexpr pulse::Nanoseconds kSamplePeriod = 50'000'000;
 constexpr pulse::Nanoseconds kPauseAfterSample = 3;  // times as long as the sample took
 
+constexpr const char* kLostStepsRemedy =
+    "check what the motor moves, its current and its acceleration, call recover, and home it";
+
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
     "call "
@@ -70,6 +73,7 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
     }
     axis->shareMotors(sharing);
   }
+  flag_checks_ = FlagChecks(context_.axes);
   const std::vector<config::OutputConfig> outputs = requests_.named.outputs.configs();
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     if (!outputs[i].compare) continue;
@@ -92,6 +96,7 @@ void Controller::handle(const Input& input, activity::Outputs& out) {
   // Before motions that begin in this turn.
   superviseCompares();
   pollLatches();
+  checkFlags();
   activities_.poll();
   supervise();
   while (supervisePower() || superviseOutputs()) {
@@ -121,10 +126,27 @@ void Controller::pollLatches() {
   }
 }
 
+void Controller::checkFlags() {
+  const auto findings = flag_checks_.poll(
+      context_, [this](const axis::AxisModel& axis) { return isBeingHomed(axis); });
+  for (const FlagChecks::Finding& finding : findings) {
+    if (finding.axis->config.homing->check_at_flag == config::FlagCheck::kFault) {
+      failAxis(*finding.axis, finding.text, kLostStepsRemedy);
+    } else {
+      finding.axis->position.warn(finding.text);
+    }
+  }
+}
+
+bool Controller::isBeingHomed(const axis::AxisModel& axis) const {
+  const Activity* const owner = activities_.owner(axis);
+  return owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone;
+}
+
 pulse::Nanoseconds Controller::due() const {
   pulse::Nanoseconds due =
       std::min({activities_.due(), context_.motor_power.due(), requests_.named.outputs.due(),
-                requests_.named.inputs.due(), requests_.latches.due()});
+                requests_.named.inputs.due(), requests_.latches.due(), flag_checks_.due()});
   for (const auto& axis : context_.axes) due = std::min(due, idleDue(*axis));
   return due;
 }
@@ -323,10 +345,8 @@ bool Controller::superviseOutputs() {
 void Controller::superviseCompares() {
   if (requests_.named.outputs.empty()) return;
   context_.motion_outputs.supervise(
-      context_, requests_.whySafe(), [this](const axis::AxisModel& axis) {
-        const Activity* const owner = activities_.owner(axis);
-        return owner == nullptr || owner->homingPhase() == axis::HomingPhase::kNone;
-      });
+      context_, requests_.whySafe(),
+      [this](const axis::AxisModel& axis) { return !isBeingHomed(axis); });
 }
 
 void Controller::showIo() {
@@ -490,8 +510,13 @@ void Controller::takeCurrent(const RequestContext::CurrentChange& change,
 }
 
 void Controller::failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault) {
+  failAxis(axis, axis.chipText(motor) + " " + fault, axis.motor.tmcAt(motor)->remedy());
+}
+
+void Controller::failAxis(axis::AxisModel& axis, const std::string& fault,
+                          const std::string& remedy) {
   if (axis.fault) return;
-  axis.fault.latch(axis.chipText(motor) + " " + fault, axis.motor.tmcAt(motor)->remedy());
+  axis.fault.latch(fault, remedy);
   axis.distrust();
   axis.noteStop();
   pulse::Command command;
@@ -536,6 +561,7 @@ AxisSnapshot Controller::snapshotOf(const axis::AxisModel& axis) const {
   state.stopped_by = axis.stopped_by;
   state.endstops_met = axis.endstops_met;
   state.stops = axis.stops;
+  shown.holds = axis.holds;
   state.position_note = axis.position.note();
   state.drivers = axis.motor.driverStates();
   shown.steps_per_unit = axis.stepsPerUnit();

@@ -6,6 +6,7 @@
 
 #include "activity/activities.h"
 #include "activity/context.h"
+#include "flag_checks.h"
 #include "input.h"
 #include "motor/motor_lines.h"
 #include "snapshot.h"
@@ -39,7 +40,8 @@ class Controller {
   /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
   bool watchesInputs() const {
     return activities_.watchInputs() || context_.motor_power.watchesInputs() ||
-           requests_.named.inputs.areWatched() || requests_.latches.areWatched();
+           requests_.named.inputs.areWatched() || requests_.latches.areWatched() ||
+           flag_checks_.areWatched();
   }
 
   std::shared_ptr<const MachineSnapshot> snapshot() const;
@@ -63,6 +65,9 @@ class Controller {
   void handleStops(const EngineNews& news);
   void supervise();
   void pollLatches();
+  void checkFlags();
+  bool isBeingHomed(const axis::AxisModel& axis) const;
+  void failAxis(axis::AxisModel& axis, const std::string& fault, const std::string& remedy);
   bool supervisePower();
   bool motorsMayLosePower() const;
   bool superviseOutputs();
@@ -90,6 +95,7 @@ class Controller {
   activity::Context context_;
   activity::Activities activities_;
   RequestContext requests_;
+  FlagChecks flag_checks_;
   std::shared_ptr<const IoStates> io_;  // what readers see of the lines with a name
   std::uint64_t stops_concluded_ = 0;   // as MachineSnapshot's
   const EmergencyDisable emergency_disable_;

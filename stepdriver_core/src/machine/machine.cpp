@@ -181,14 +181,23 @@ class Machine::Impl {
     return begin;
   }
 
+  // A hold between two strokes only delays the second.
+  void awaitResume(const std::function<bool()>& cancelled) {
+    const auto is_held = [this] { return shell_->snapshot()->axes.front().state.held; };
+    if (!is_held()) return;
+    shell_->wait([&] { return !is_held() || (cancelled && cancelled()); },
+                 static_cast<bool>(cancelled));
+  }
+
   /// @return when it has ended. @throw Refused
   ProbeStrokeResult probeStroke(Machine& machine, ProbeStroke stroke,
                                 const std::function<bool()>& cancelled) {
     std::vector<std::string> names;
     for (const AxisId id : stroke.line.axes) names.push_back(axes_[id]->config().name);
     const auto record = stroke.latch ? stroke.latch->record : nullptr;
-    const CoordinatedMove line = moveOf(names, ask(*shell_, std::move(stroke)));
     ProbeStrokeResult ended;
+    if (!stroke.is_first) awaitResume(cancelled);
+    const CoordinatedMove line = moveOf(names, ask(*shell_, std::move(stroke)));
     for (const CoordinatedMove::Member& member : line.members) {
       ended.begin.push_back(machine.axis(member.axis).state().position);
       ended.targets.push_back(member.move.target);
@@ -216,7 +225,9 @@ class Machine::Impl {
     first.line = lineOf(request.names, request.positions);
     first.line.relative = request.relative;
     const auto now = shell_->snapshot();
-    for (const AxisId id : first.line.axes) first.stops.push_back(now->axes.at(id).state.stops);
+    for (const AxisId id : first.line.axes) {
+      first.stops.push_back(now->axes.at(id).stopsOtherThanHolds());
+    }
     LatchRequest latch;
     latch.input = request.input;
     latch.edge = request.away ? LatchEdge::kInactive : LatchEdge::kActive;
@@ -855,6 +866,12 @@ LatchResult Machine::wait(const Latch& latch, const std::function<bool()>& cance
     end(latch);
   }
   return *latch.record->result();
+}
+
+std::optional<LatchResult> Machine::waitFor(const Latch& latch,
+                                            std::chrono::nanoseconds longest) const {
+  impl_->shell_->waitFor([&] { return latch.record->result().has_value(); }, longest);
+  return latch.record->result();
 }
 
 void Machine::end(const Latch& latch) { ask(*impl_->shell_, EndLatch{latch.id}); }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gpio/chip_table.h"
+#include "past_position.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -16,11 +17,6 @@ template <typename Action>
 void forEachWatched(const PositionLatches::Subject& subject, const Action& action) {
   for (axis::AxisModel* axis : subject.axes) action(*axis);
   if (subject.window_axis != nullptr) action(*subject.window_axis);
-}
-
-double positionAt(const activity::Context& context, const axis::AxisModel& axis,
-                  pulse::Nanoseconds time) {
-  return axis.positionOf(axis.jointAtTime(context.motionTimeAt(time)));
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ struct AxisSnapshot {
   };
 
   axis::AxisState state;        ///< without the parts that change with every step
+  std::uint64_t holds = 0;      ///< how many of its stops were holds, or the ends of holds
   double steps_per_unit = 1.0;  ///< [microsteps/unit]
   double origin = 0.0;          ///< [unit] position at count 0
   double commanded = 0.0;       ///< [unit] the commanded position, if the axis is at rest
@@ -54,6 +55,8 @@ struct AxisSnapshot {
   motion::PathAxis path_axis;
   pulse::ChannelState channel;  ///< from the engine's last news
   axis::AxisMemory memory;
+
+  std::uint64_t stopsOtherThanHolds() const { return state.stops - holds; }
 };
 
 /// All axes at the end of one turn of the controller.

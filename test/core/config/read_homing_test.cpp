@@ -240,6 +240,26 @@ TEST(ReadHoming, ABlockHasNoSwitchAndNoDebounce) {
   EXPECT_NE(issues[0].find("homing/debounce_ms: is not known"), std::string::npos) << issues[0];
 }
 
+TEST(ReadHoming, ReadsTheCheckAtTheFlag) {
+  ConfigValue axis = blockAxis();
+  put(axis, "homing/kind", "flag");
+  put(axis, "homing/latch_speed_mm_s", 5.0);
+  EXPECT_EQ(readX(axis).homing->check_at_flag, FlagCheck::kNone);
+  put(axis, "homing/check_at_flag", "fault");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/check_tolerance_mm", "is missing; it must be a number above 0"));
+  put(axis, "homing/check_tolerance_mm", 0.4);
+  EXPECT_EQ(readX(axis).homing->check_at_flag, FlagCheck::kFault);
+  EXPECT_DOUBLE_EQ(readX(axis).homing->flag_tolerance, 0.0004);
+  put(axis, "homing/check_tolerance_mm", 0.001);
+  EXPECT_EQ(issuesOfX(axis).size(), 1U);
+  put(axis, "homing/check_tolerance_mm", 0.4);
+  put(axis, "homing/kind", "block");
+  drop(axis, "homing/latch_speed_mm_s");
+  EXPECT_EQ(issuesOfX(axis),
+            lineOfX("homing/check_at_flag", "is given, but this homing has no flag"));
+}
+
 TEST(ReadHoming, ReadsAFinalPositionInPlaceOfThePullOff) {
   ConfigValue axis = homingAxis();
   drop(axis, "homing/pull_off_mm");

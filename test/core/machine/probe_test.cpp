@@ -54,11 +54,19 @@ class BreakableBackend : public gpio::Backend {
 
 class ProbeTest : public testing::Test {
  protected:
-  void SetUp() override { build(20.0); }
+  struct Rig {
+    double contact = 20.0;  // [mm]
+    double hysteresis = 0.0;
+    int bounces = 0;
+    std::int64_t debounce_ns = 0;
+    bool must_home = false;
+  };
 
-  void build(double contact, double start = 0.0, int bounces = 0, bool must_home = false) {
+  void SetUp() override { build({}); }
+
+  void build(const Rig& rig) {
     std::vector<config::AxisConfig> axes{linearAxis("x"), linearAxis("y")};
-    if (must_home) {
+    if (rig.must_home) {
       axes[0].homing.emplace().kind = config::HomingKind::kDirect;
       axes[0].require_homing = true;
     }
@@ -66,20 +74,20 @@ class ProbeTest : public testing::Test {
     sim::SwitchSpec probe;
     probe.line = "io.probe";
     probe.active_level = true;
-    probe.position = contact;
-    probe.end = contact + 60.0;
-    probe.bounces = bounces;
+    probe.position = rig.contact;
+    probe.end = rig.contact + 60.0;
+    probe.hysteresis = rig.hysteresis;
+    probe.bounces = rig.bounces;
     probe.bounce_ns = 100'000;
     specs[0].flags.push_back(probe);
-    specs[0].start = start;
     machine::MachineOptions options;
     config::InputConfig input;
     input.name = "probe";
     input.line = {"io.probe", true, Bias::kAsIs};
-    input.debounce_ns = bounces > 0 ? 2'000'000 : 0;
+    input.debounce_ns = rig.debounce_ns;
     options.inputs.push_back(input);
     bench = std::make_unique<Bench>(axes, specs, false, 0.0, options);
-    if (must_home) return;
+    if (rig.must_home) return;
     for (const auto& axis : bench->machine->axes()) axis->setPosition(0.0);
   }
 
@@ -125,19 +133,64 @@ TEST_F(ProbeTest, AThousandContactsAreWithinHalfAStepOfTheRigsPlace) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> places(1.0, 45.0);
   std::uniform_real_distribution<double> speeds(0.001, 0.1);
+  std::uniform_real_distribution<double> others(-0.05, 0.05);
   double worst = 0.0;
   for (int i = 0; i < 1000; ++i) {
     const double place = places(random);
-    build(place, 0.0, i % 3 == 0 ? 5 : 0);
+    // Bouncing, with a debounce time or without, and a switch that opens later than it closes.
+    build({place, i % 2 == 0 ? 0.2 : 0.0, i % 3 == 0 ? 5 : 0, i % 6 == 0 ? 2'000'000 : 0});
     ProbeRequest request = towards(0.05);
     request.velocity = speeds(random);
+    if (i % 5 == 0) {
+      request.second_velocity = 0.002;
+      request.back_off = 0.001;
+    }
+    if (i % 7 == 0) {
+      request.names.emplace_back("y");
+      request.positions.push_back(others(random));
+    }
+    request.returns = i % 4 == 0;
     const ProbeResult result = probe(request);
-    ASSERT_EQ(result.end, ProbeEnd::kContact) << result.message;
-    // It is pressed by the first step at or beyond its place.
+    ASSERT_EQ(result.end, ProbeEnd::kContact) << i << ": " << result.message;
+    // The first step at or beyond its place presses it.
     const double step = std::ceil(place * 80.0 - 1e-6) / 80'000.0;
-    worst = std::max(worst, std::abs(result.contact.at(0) - (step - 0.5 * kStep)));
+    worst = std::max(worst, std::abs(result.contact.at(0) - step));
+    ASSERT_LE(worst, 0.5 * kStep + 1e-9) << i;
+    ASSERT_LE(result.positions.at(0), 0.05 + 1e-9);
   }
-  EXPECT_LE(worst, 0.5 * kStep);
+  RecordProperty("worst_in_thousandths_of_a_step", static_cast<int>(1e3 * worst / kStep));
+}
+
+TEST_F(ProbeTest, WhoseSwitchOpensTooLateForTheSecondTouchSaysSo) {
+  build({20.0, 2.0});
+  ProbeRequest request = towards(0.05);
+  request.second_velocity = 0.002;
+  request.back_off = 0.001;
+  const ProbeResult result = probe(request);
+  EXPECT_EQ(result.end, ProbeEnd::kFailed);
+  EXPECT_EQ(result.message, "x: the input probe is active already, so it can't tell of a contact");
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8) << "that of the first touch";
+  EXPECT_FALSE(bench->axis().state().moving);
+}
+
+TEST_F(ProbeTest, OnTheWrongSideMeetsNoContact) {
+  build({-70.0});  // from -70 to -10 mm
+  const ProbeResult result = probe(towards(0.05));
+  EXPECT_EQ(result.end, ProbeEnd::kNoContact);
+  EXPECT_EQ(result.message,
+            "the first touch met no contact at the input probe: all axes reached their targets");
+}
+
+// It takes a moment until the pulses stop: never beyond the position of the request.
+TEST_F(ProbeTest, AContactRightBeforeTheEndMovesNoFarther) {
+  for (const double place : {49.9, 49.99, 49.9875, 50.0}) {
+    build({place});
+    ProbeRequest request = towards(0.05);
+    request.velocity = 0.1;
+    const ProbeResult result = probe(request);
+    EXPECT_EQ(result.end, ProbeEnd::kContact) << place << ": " << result.message;
+    EXPECT_LE(bench->pulses(), 4000) << place;
+  }
 }
 
 TEST_F(ProbeTest, AlongALineOfSeveralAxesTellsAllOfThem) {
@@ -151,7 +204,7 @@ TEST_F(ProbeTest, AlongALineOfSeveralAxesTellsAllOfThem) {
 }
 
 TEST_F(ProbeTest, AwayFromAContactTakesTheEdgeAtWhichItEnds) {
-  build(-40.0, 0.0);  // pressed until 20 mm
+  build({-40.0});  // pressed until 20 mm
   ProbeRequest request = towards(0.05);
   request.away = true;
   const ProbeResult result = probe(request);
@@ -174,7 +227,7 @@ TEST_F(ProbeTest, WithoutAContactItFailsOrNotAsAsked) {
 }
 
 TEST_F(ProbeTest, IsRefusedIfTheContactIsThereAtTheStart) {
-  build(-1.0);
+  build({-1.0});
   EXPECT_REFUSED(probe(towards(0.05)), "the input probe is active already");
   ProbeRequest request = towards(0.05);
   request.second_velocity = 0.001;
@@ -187,7 +240,7 @@ TEST_F(ProbeTest, EndsWithWhateverEndsALine) {
       [this] { bench->axis().stop(); }, [this] { bench->axis().enable(false); },
       [this] { bench->machine->emergencyStop(); }, [this] { bench->axis().moveTo(-0.01); }};
   for (const auto& end : ends) {
-    build(20.0);
+    build({});
     bool done = false;
     const ProbeResult result = probe(towards(0.05), [&] {
       if (!done && bench->axis().state().position > 0.005) {
@@ -217,6 +270,30 @@ TEST_F(ProbeTest, AHoldOnlyPutsOffTheContact) {
     return false;
   });
   EXPECT_TRUE(held);
+  EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+  EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
+}
+
+// The hold comes while the axis decelerates from the contact, and ends when it has come to rest.
+TEST_F(ProbeTest, AHoldBetweenTwoTouchesOnlyPutsOffTheSecond) {
+  ProbeRequest request = towards(0.05);
+  request.second_velocity = 0.002;
+  request.back_off = 0.003;
+  bool held = false;
+  bool resumed = false;
+  const ProbeResult result = probe(request, [&] {
+    if (!held && bench->axis().state().position > 0.02) {
+      held = true;
+      bench->machine->hold();
+    }
+    if (held && !resumed && !bench->axis().state().moving) {
+      resumed = true;
+      bench->machine->advance(0.5);
+      bench->machine->resume();
+    }
+    return false;
+  });
+  EXPECT_TRUE(resumed);
   EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
   EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
 }
@@ -260,7 +337,7 @@ TEST_F(ProbeTest, AStopWhileItComesToRestEndsItWithoutAnotherStroke) {
 }
 
 TEST_F(ProbeTest, WorksBeforeTheAxisIsHomedIfItsWayIsRelative) {
-  build(20.0, 0.0, 0, true);
+  build({20.0, 0.0, 0, 0, true});
   ProbeRequest request = towards(0.05);
   EXPECT_REFUSED(probe(request), "home");
   request.relative = true;

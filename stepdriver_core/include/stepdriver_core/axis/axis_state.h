@@ -117,8 +117,8 @@ struct AxisState {
   /// How many times something has stopped the axis, moving or not (a stop, a hold, a disable, a
   /// sleep, a fault, an emergency stop), or ended that (a resume, an enable, a wake, a recover).
   std::uint64_t stops = 0;
-  /// Why the position that was kept over a restart can't be trusted; empty: it can, or there is
-  /// none.
+  /// Why the position that was kept over a restart can't be trusted, or why one that is valid is
+  /// doubtful (config::FlagCheck::kWarning); empty: there is no such reason.
   std::string position_note;
   /// Of each motor whose chip has a serial port, what the chip said last; nullptr: no chip has one.
   std::shared_ptr<const std::vector<driver::DriverState>> drivers;

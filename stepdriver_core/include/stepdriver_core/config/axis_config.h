@@ -119,6 +119,13 @@ enum class HomingKind {
 
 /// How an axis finds its zero: at its trigger point. A unit is m on a linear axis, rad on a rotary
 /// one.
+/// What it means if the flag of a homing comes at another place later.
+enum class FlagCheck {
+  kNone,     ///< nothing looks
+  kWarning,  ///< AxisState::position_note says so
+  kFault,    ///< the axis has a fault, and its position can't be trusted
+};
+
 struct HomingConfig {
   HomingKind kind = HomingKind::kLimit;
   /// The switch is the max endstop, or of other kinds, the axis moves towards max; false: min.
@@ -138,6 +145,8 @@ struct HomingConfig {
   double max_travel = 0.0;  ///< [unit] longest stroke to reach or leave the switch
   double timeout = 60.0;    ///< [s] for the whole homing
   double debounce = 0.005;  ///< [s] a level of the endstop must last so long to count
+  FlagCheck check_at_flag = FlagCheck::kNone;
+  double flag_tolerance = 0.0;  ///< [unit] of that check
   int order = 0;  ///< axes with the lowest number go first; the same number: simultaneously
 };
 

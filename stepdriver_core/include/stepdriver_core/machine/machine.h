@@ -358,6 +358,8 @@ class Machine {
   ///
   /// @param cancelled asked often while this waits; if it returns true, the latch ends.
   LatchResult wait(const Latch& latch, const std::function<bool()>& cancelled = {});
+  /// The same for at most this time, as axis::Axis::waitFor(); empty if it hasn't ended by then.
+  std::optional<LatchResult> waitFor(const Latch& latch, std::chrono::nanoseconds longest) const;
   /// Ends it. Does nothing if it has ended.
   void end(const Latch& latch);
   /// Moves axes along a straight line until an input tells of a contact: they come to rest then, at

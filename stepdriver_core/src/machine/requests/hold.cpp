@@ -12,7 +12,7 @@ void Hold::serve(RequestContext& machine, const SharedCall& call) const {
   if (context.mode.held) return;
   context.mode.held = true;
   machine.activities.schedule().dropAll({axis::MoveEnd::kStopped, "the machine was put on hold"});
-  for (const auto& axis : context.axes) ++axis->stops;
+  for (const auto& axis : context.axes) axis->noteHold();
   machine.activities.forEach([&](activity::Activity& activity) {
     if (activity.hasBegun()) activity.hold(call);
   });

@@ -24,7 +24,7 @@ void ProbeStroke::serve(RequestContext& machine, const SharedCall& call) const {
 void ProbeStroke::refuseUnlessUndisturbed(RequestContext& machine) const {
   for (std::size_t i = 0; i < line.axes.size(); ++i) {
     const axis::AxisModel& axis = machine.axis(line.axes[i]);
-    if (axis.stops != stops.at(i)) axis.refuse("it was stopped");
+    if (axis.stops - axis.holds != stops.at(i)) axis.refuse("it was stopped");
     if (is_first) {
       machine.refuseUnlessFree(axis, "a probing begins");
     } else if (axis.moving()) {

@@ -15,7 +15,8 @@ struct ProbeStroke {
   MoveLine line;
   std::optional<BeginLatch> latch;  ///< of the axes of the line; empty: it goes back
   bool is_first = true;
-  /// AxisState::stops of each axis when the probing began: whatever stops one of them ends it.
+  /// AxisSnapshot::stopsOtherThanHolds() of each axis when the probing began: whatever stops one of
+  /// them ends it.
   std::vector<std::uint64_t> stops;
 
   static constexpr bool kReadsInputs = true;

@@ -12,7 +12,7 @@ void Resume::serve(RequestContext& machine, const SharedCall& call) const {
     if (activity.hasBegun()) activity.refuseUnlessResumable();
   });
   context.mode.held = false;
-  for (const auto& axis : context.axes) ++axis->stops;
+  for (const auto& axis : context.axes) axis->noteHold();
   machine.activities.forEach([&](activity::Activity& activity) {
     if (activity.hasBegun()) activity.resume(call);
   });

@@ -16,7 +16,9 @@ void SetPosition::serve(RequestContext& machine, const SharedCall& /*call*/) con
   machine.refuseUnlessFree(changed, "its position is set");
   changed.refuseUnlessFinite("position", position);
   changed.refuseBeyondLimits(position, "the position");
-  changed.position.declare(position - changed.exactCount() / changed.stepsPerUnit());
+  const double origin = position - changed.exactCount() / changed.stepsPerUnit();
+  changed.flag_places.shift(origin - changed.position.origin());
+  changed.position.declare(origin);
 }
 
 }  // namespace stepdriver::machine

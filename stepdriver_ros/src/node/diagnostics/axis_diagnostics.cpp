@@ -115,6 +115,8 @@ void reportAxis(const config::AxisConfig& config, const AxisReading& reading,
                         "the position is unverified" +
                             (state.position_note.empty() ? "" : " (" + state.position_note + ")") +
                             ": home it, or set its position");
+  } else if (!state.position_note.empty()) {
+    status.mergeSummary(DiagnosticStatus::WARN, state.position_note + ": home it");
   }
   if (reading.endstops.min.value_or(false)) {
     status.mergeSummary(DiagnosticStatus::WARN, "the min endstop is active");
