@@ -50,6 +50,14 @@ constexpr double kPoorCubic = 1.01;
 constexpr double kMostStretch = 0.1;
 constexpr double kMostDeviation = 0.02;  // relative to the resolution
 constexpr double kMostLeftOut = 0.01;    // relative to the resolution
+// How far a cubic that leaves out knots may be beside the path, relative to the resolution, and the
+// parts of its duration at whose ends that is looked at.
+constexpr double kMostBeside = 0.05;
+constexpr int kLooks = 8;
+// Where a cubic is farther from it, the motion is slowed down by this factor, at most so many
+// times.
+constexpr double kSlowerBy = 1.5;
+constexpr int kMostSlowed = 40;
 constexpr int kMostDivisions = 4;
 constexpr std::size_t kPartsOfDivided = 2;
 
@@ -145,9 +153,11 @@ class Knots {
     findDurations(speed);
     findClosest();
     knots_.clear();
+    planned_.clear();
     inner_.clear();
     // A straight part may have two more knots.
-    knots_.reserve(2 * grid_.size());
+    knots_.reserve(3 * grid_.size());
+    planned_.reserve(3 * grid_.size() + 1);
     appendPlace(0, 0.0, kept_[0].begin, 0);
     double time = 0.0;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
@@ -161,6 +171,10 @@ class Knots {
   double beginSpeed(std::size_t interval) const { return kept_[interval].begin; }
   double endSpeed(std::size_t interval) const { return kept_[interval].end; }
   double duration(std::size_t interval) const { return kept_[interval].duration; }  ///< [s]
+  /// Whether there may be a knot within an interval that isn't too close to those at its ends.
+  bool hasRoom(std::size_t interval) const {
+    return duration(interval) >= 2.0 * closest_[interval];
+  }
   /// Whether settle() has been called since the speeds of an interval changed.
   bool isSettled(std::size_t interval) const { return kept_[interval].settled; }
   void settle(std::size_t interval) { kept_[interval].settled = true; }
@@ -171,10 +185,10 @@ class Knots {
       kept.usage = cubicUsage(
           kept.duration, PathSpeed(path_, grid_[interval].segment, grid_[interval].segment),
           [&](std::size_t j) -> Joint {
-            return {grid_.position(interval)[j], grid_.firstAtBegin(interval)[j] * kept.begin};
+            return {grid_.position(interval)[j], directionAt(interval)[j] * kept.begin};
           },
           [&](std::size_t j) -> Joint {
-            return {grid_.position(interval + 1)[j], grid_.firstAtEnd(interval)[j] * kept.end};
+            return {grid_.position(interval + 1)[j], directionAt(interval + 1)[j] * kept.end};
           });
     }
     return *kept.usage;
@@ -206,6 +220,32 @@ class Knots {
     const bool whole = first + 1 == last && parameter(knot - 1) == grid_[first].to;
     return grid_[last].straight && (first == last || whole);
   }
+  /// Whether the cubic that ends at a knot leaves the path because others, which would be too close
+  /// to each other, were left out on its way: to the side of one of them, or beyond all of them.
+  bool leavesPath(std::size_t knot) const {
+    if (!knots_[knot].skipped) return false;
+    const Knot& from = knots_[knot - 1];
+    const Knot& to = knots_[knot];
+    const auto [first, last] = between(from, to);
+    for (std::size_t j = 0; j < axes_; ++j) {
+      const double begin = jointAt(from, j).position;
+      const double end = jointAt(to, j).position;
+      double lowest = std::min(begin, end);
+      double highest = std::max(begin, end);
+      for (auto left_out = first; left_out != last; ++left_out) {
+        const double place = jointAt(*left_out, j).position;
+        lowest = std::min(lowest, place);
+        highest = std::max(highest, place);
+      }
+      for (int k = 1; k < kLooks; ++k) {
+        const double time = from.time + (to.time - from.time) * k / kLooks;
+        const double place = cubicAt(from, to, time, j).position;
+        if (std::max(lowest - place, place - highest) > kMostBeside * resolution_) return true;
+      }
+    }
+    return std::any_of(first, last,
+                       [&](const Knot& left_out) { return isBeside(from, to, left_out); });
+  }
   /// [s] The time of the last knot that isn't after a place.
   double timeAt(std::size_t place) const {
     const auto later = std::lower_bound(
@@ -233,7 +273,6 @@ class Knots {
 
  private:
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-  static constexpr double kForever = std::numeric_limits<double>::infinity();
 
   // What is known about an interval.
   struct Kept {
@@ -309,8 +348,8 @@ class Knots {
     double most = kMostStretch;
     for (std::size_t j = 0; j < axes_; ++j) {
       const double way = grid_.position(interval + 1)[j] - grid_.position(interval)[j];
-      const double v0 = grid_.firstAtBegin(interval)[j] * begin;
-      const double v1 = grid_.firstAtEnd(interval)[j] * end;
+      const double v0 = directionAt(interval)[j] * begin;
+      const double v1 = directionAt(interval + 1)[j] * end;
       const double slope = 6.0 * way * rate * rate;
       const double at_begin = slope - (4.0 * v0 + 2.0 * v1) * rate;
       const double at_end = (2.0 * v0 + 4.0 * v1) * rate - slope;
@@ -365,32 +404,27 @@ class Knots {
   // What is left out is then only how the axes move in that time; before and after it, the motion
   // is as planned.
   void append(const Knot& next) {
-    const double since = knots_.empty() ? kForever : next.time - knots_.back().time;
-    const double closest = knots_.empty() ? 0.0 : closestBetween(knots_.size() - 1, next);
-    if (since < closest && (next.rests || replacesLast(next))) {
-      appendInstead(next);
-    } else {
-      if (skips_ && since >= 2.0 * closest && matters(knots_.back(), seen_, next)) {
-        push(within(seen_, next, knots_.back().time + closest));
-      }
-      if (since >= closest) {
-        push(next);
-      } else {
-        skips_ = true;
-      }
-    }
-    seen_ = next;
+    planned_.push_back(next);
+    if (knots_.empty()) return push(next);
+    const bool stays = next.rests || mayReplaceLast(next);
+    if (stays && next.time - knots_.back().time < closestBefore(next)) return appendInstead(next);
+    replaceLeftOut(next, stays);
+    if (next.time - knots_.back().time >= closestBefore(next)) push(next);
   }
 
   void push(const Knot& next) {
+    bool skips = false;
+    if (!knots_.empty()) {
+      const auto [first, last] = between(knots_.back(), next);
+      skips = first != last;
+    }
     knots_.push_back(next);
-    knots_.back().skipped = skips_;
-    skips_ = false;
+    knots_.back().skipped = skips;
   }
 
-  // Whether a knot that is too close to the last one is where the shortest time between knots
-  // changes, and isn't too close to the one before that.
-  bool replacesLast(const Knot& next) const {
+  // Whether a knot is where the shortest time between knots changes, and isn't too close to the one
+  // before the last one.
+  bool mayReplaceLast(const Knot& next) const {
     const bool changes = next.place != kNone && next.place < grid_.size() &&
                          closest_[next.place] != closest_[next.interval];
     if (!changes || knots_.size() < 2 || knots_.back().rests) return false;
@@ -401,18 +435,47 @@ class Knots {
   // @pre the knot is too close to the last one, which it replaces unless the motion rests there.
   void appendInstead(const Knot& next) {
     if (knots_.size() > 1 && !knots_.back().rests) {
-      const Knot close = knots_.back();
       knots_.pop_back();
-      const Knot& before = knots_.back();
-      const double closest = closestBetween(knots_.size() - 1, next);
-      const bool has_room = next.time - before.time >= 2.0 * closest;
-      if (has_room && !close.skipped && matters(before, close, next)) {
-        push(within(before, close, next.time - closest));
-        knots_.back().skipped = false;
+      const double closest = closestBefore(next);
+      const bool has_room = next.time - knots_.back().time >= 2.0 * closest;
+      if (has_room && leavesOutWhatMatters(next)) {
+        const Knot last = plannedAt(next.time - closest);
+        replaceLeftOut(last, true);
+        push(last);
       }
-      skips_ = true;
     }
     push(next);
+  }
+
+  // If the knots that have been left out since the last one make a difference, they are followed by
+  // a state after the shortest time. @param stays whether there must be as much time after it.
+  void replaceLeftOut(const Knot& next, bool stays) {
+    const double closest = closestBefore(next);
+    const double since = next.time - knots_.back().time;
+    if (since < (stays ? 2.0 : 1.0) * closest || !leavesOutWhatMatters(next)) return;
+    push(plannedAt(knots_.back().time + closest));
+  }
+
+  // The planned knots after one and before another one.
+  using Planned = std::vector<Knot>::const_iterator;
+  std::pair<Planned, Planned> between(const Knot& from, const Knot& to) const {
+    const auto first = std::upper_bound(planned_.begin(), planned_.end(), from.time,
+                                        [](double time, const Knot& of) { return time < of.time; });
+    const auto last = std::lower_bound(first, planned_.end(), to.time,
+                                       [](const Knot& of, double time) { return of.time < time; });
+    return {first, last};
+  }
+  bool leavesOutWhatMatters(const Knot& next) const {
+    const auto [first, last] = between(knots_.back(), next);
+    return std::any_of(
+        first, last, [&](const Knot& left_out) { return matters(knots_.back(), left_out, next); });
+  }
+
+  // The state of the planned motion at a time. @pre it is after the first knot and before the last.
+  Knot plannedAt(double time) {
+    const auto to = std::lower_bound(planned_.begin() + 1, planned_.end() - 1, time,
+                                     [](const Knot& of, double at) { return of.time < at; });
+    return within(*(to - 1), *to, time);
   }
 
   // Whether the cubic between two knots is off by more than a small part of the resolution because
@@ -428,6 +491,22 @@ class Knots {
       if (most > kMostLeftOut * resolution_) return true;
     }
     return false;
+  }
+
+  // Whether the cubic between two knots passes one that is left out between them at a distance, at
+  // a right angle to the path.
+  bool isBeside(const Knot& from, const Knot& to, const Knot& left_out) const {
+    const double* direction = grid_.firstAtEnd(left_out.interval);
+    double square = 0.0;
+    double along = 0.0;
+    for (std::size_t j = 0; j < axes_; ++j) {
+      const double off =
+          cubicAt(from, to, left_out.time, j).position - jointAt(left_out, j).position;
+      square += off * off;
+      along += off * direction[j];
+    }
+    const double most = kMostBeside * resolution_;
+    return square - along * along > most * most;
   }
 
   // The state of an axis on the cubic between two knots.
@@ -467,9 +546,14 @@ class Knots {
       const double direction = grid_.firstAtBegin(knot.interval)[axis];
       return {grid_.position(knot.interval)[axis] + direction * knot.way, direction * knot.speed};
     }
-    const double* direction =
-        knot.place > 0 ? grid_.firstAtEnd(knot.interval) : grid_.firstAtBegin(knot.interval);
+    const double* direction = directionAt(knot.place);
     return {grid_.position(knot.place)[axis], direction[axis] * knot.speed};
+  }
+
+  // The direction of the motion at a place. Where the path turns by less than what counts as a
+  // corner, it is the one before the place.
+  const double* directionAt(std::size_t place) const {
+    return place > 0 ? grid_.firstAtEnd(place - 1) : grid_.firstAtBegin(0);
   }
 
   // Finds how close knots in each interval may be, see kMostRounding. An axis that stands still in
@@ -506,6 +590,8 @@ class Knots {
            grid_.firstAtBegin(interval)[axis] != 0.0 || grid_.firstAtEnd(interval)[axis] != 0.0;
   }
 
+  // [s] In the intervals from the last knot to one that isn't in the list yet.
+  double closestBefore(const Knot& next) const { return closestBetween(knots_.size() - 1, next); }
   // [s] In the intervals from a knot to one that isn't in the list yet.
   double closestBetween(std::size_t knot, const Knot& next) const {
     double closest = 0.0;
@@ -522,12 +608,11 @@ class Knots {
   std::size_t axes_;
   std::vector<Kept> kept_;  // for each interval
   std::vector<Knot> knots_;
-  std::vector<Joint> inner_;  // for each axis, at some of the knots
+  std::vector<Knot> planned_;  // all knots, also those that are left out
+  std::vector<Joint> inner_;   // for each axis, at some of the knots
   // [s] The least time between knots in each interval, except between two at rest; 0 in a first
   // plan.
   std::vector<double> closest_;
-  bool skips_ = false;  // whether knots were left out after the last one
-  Knot seen_{};         // the last knot, even if it was left out
 };
 
 // The factors by which limits are exceeded; 1 if they aren't.
@@ -651,6 +736,23 @@ Excess lowerLimits(double by_more, double poor, const PathGrid& grid, Reachabili
   return worst;
 }
 
+// Lowers the speeds in the curves of which cubics leave the path because knots were left out.
+// @return whether there are any
+bool slowDownBeside(const PathGrid& grid, Reachability& speed, const Knots& knots) {
+  bool any = false;
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    if (!knots.leavesPath(i)) continue;
+    const std::size_t last = knots.interval(i);
+    for (std::size_t k = std::min(knots.intervalAfter(i - 1), last); k <= last; ++k) {
+      const double highest = std::max(knots.beginSpeed(k), knots.endSpeed(k)) / kSlowerBy;
+      if (grid[k].straight || highest == 0.0 || knots.hasRoom(k)) continue;
+      speed.restrict(k, highest * highest, std::numeric_limits<double>::infinity());
+      any = true;
+    }
+  }
+  return any;
+}
+
 // The same motion, slower by a factor, at times of whole nanoseconds.
 std::vector<TimingKnot> slowedDown(const Knots& knots, const PathGrid& grid, double factor,
                                    double ago) {
@@ -698,10 +800,16 @@ Outcome planKnots(const Path& path, const std::vector<TimingLimits>& limits, dou
     if (!divideLong(kMostDeviation * path.resolution(), grid, speed, knots)) break;
   }
   std::vector<bool> divided(grid.size(), false);
+  int slowed = 0;
   for (int plans = 1;; ++plans) {
     divide(divided, grid, speed, knots);
     speed.plan();
     knots.make(speed);
+    while (slowed < kMostSlowed && slowDownBeside(grid, speed, knots)) {
+      ++slowed;
+      speed.plan();
+      knots.make(speed);
+    }
     const bool first = plans == 1;
     // Lowering the mean of an interval whose cubic still exceeds a limit by little may move the
     // excess from one of its ends to the other one for ever.

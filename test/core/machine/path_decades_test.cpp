@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -31,20 +33,23 @@ using motion::PathSegment;
 using test::AxisSteps;
 using test::PlannedPath;
 
-// Two axes of a microstep a unit.
+// Two axes of a microstep a unit, and a third one that hardly moves.
 using Point = std::array<double, 2>;
 
 struct Drawn {
   PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0};
   std::vector<PathSegment> appended;
   std::vector<motion::PathAxis> axes;
+  std::vector<double> begin{0.0, 0.0};
   std::string text;
 };
 
 class Decades {
  public:
   // @param edges how often a limit is one of the two that the reader accepts.
-  Decades(unsigned seed, double edges) : random_(seed), edges_(edges) {}
+  // @param farthest where the third axis begins at most [decades]; empty: there is none
+  Decades(unsigned seed, double edges, std::optional<double> farthest)
+      : random_(seed), edges_(edges), farthest_(farthest) {}
 
   double number(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
@@ -64,6 +69,7 @@ class Decades {
       drawn.text += name + fmt::format(": {:.3g} /s, {:.3g} /s^2, {:.3g} /s^3; ", limits.speed,
                                        limits.acceleration, limits.jerk);
     }
+    if (farthest_) addThird(drawn, jerk);
     drawn.request.tolerance = often(0.3) ? 0.0 : decades(-6.0, 3.0);
     drawn.request.velocity = often(0.2) ? 0.0 : decades(-3.0, 6.0);
     drawn.request.more_follows = fed;
@@ -80,6 +86,29 @@ class Decades {
   double edge(double low, double high) {
     if (often(edges_)) return std::pow(10.0, often(0.5) ? low : high);
     return decades(low, high);
+  }
+
+  void addThird(Drawn& drawn, bool jerk) {
+    test::PathAxisLimits limits;
+    limits.steps_per_unit = 1.0;
+    limits.speed = edge(-3.0, 3.0);
+    limits.acceleration = edge(-3.0, 3.0);
+    if (jerk) limits.jerk = edge(-3.0, 6.0);
+    third_ = std::round(decades(0.0, *farthest_));
+    drawn.begin.push_back(third_);
+    drawn.axes.push_back(test::pathAxis("z", limits));
+    drawn.request.names.emplace_back("z");
+    drawn.text += fmt::format("z: {:.3g} /s, {:.3g} /s^2, {:.3g} /s^3 from {}; ", limits.speed,
+                              limits.acceleration, limits.jerk, third_);
+  }
+
+  void moveThird(PathSegment& made) {
+    const double from = third_;
+    if (often(0.6)) third_ += decades(-13.0, -3.0) * (often(0.5) ? 1.0 : -1.0);
+    made.end.push_back(third_);
+    if (made.shape != PathSegment::Shape::kBezier) return;
+    made.control1.push_back(from + (third_ - from) / 3.0);
+    made.control2.push_back(third_ - (third_ - from) / 3.0);
   }
 
   PathSegment segment(std::string& text) {
@@ -108,15 +137,17 @@ class Decades {
       made.control2 = {place_[0] + way[0] * 2.0 / 3.0 - way[1] * bow,
                        place_[1] + way[1] * 2.0 / 3.0 + way[0] * bow};
     }
-    text += fmt::format("{} to {:.6g} {:.6g} at {:.3g}; ", shape, made.end[0], made.end[1],
-                        made.velocity);
+    if (farthest_) moveThird(made);
+    text += fmt::format("{} to {:.6g} at {:.3g}; ", shape, fmt::join(made.end, " "), made.velocity);
     place_ = {made.end[0], made.end[1]};
     return made;
   }
 
   std::mt19937 random_;
   double edges_;
+  std::optional<double> farthest_;
   Point place_{};
+  double third_ = 0.0;
 };
 
 double distanceTo(const Point& point, const Point& a, const Point& b) {
@@ -132,14 +163,17 @@ double distanceTo(const Point& point, const Point& a, const Point& b) {
 class Hull {
  public:
   explicit Hull(const Drawn& drawn) {
-    motion::PathFrame frame{
-        drawn.request.names, {0.0, 0.0}, drawn.request.velocity, drawn.request.tolerance, {}};
-    motion::PathReader reader(frame, drawn.axes, {0.0, 0.0});
+    motion::PathFrame frame{drawn.request.names,
+                            std::vector<double>(drawn.axes.size()),
+                            drawn.request.velocity,
+                            drawn.request.tolerance,
+                            {}};
+    motion::PathReader reader(frame, drawn.axes, drawn.begin);
     std::vector<motion::CurveSegment> segments;
     for (const PathSegment& segment : drawn.request.segments) reader.read(segment, segments);
     for (const PathSegment& segment : drawn.appended) reader.read(segment, segments);
     if (segments.empty()) return;
-    const motion::Path path({0.0, 0.0}, segments, 1.0);
+    const motion::Path path(drawn.begin, segments, 1.0);
     motion::PathPoint point;
     for (std::size_t i = 0; i < segments.size(); ++i) {
       const int parts = path.isLine(i) ? 1 : 200;
@@ -227,15 +261,16 @@ void expectGoodSteps(const Drawn& drawn, const PlannedPath& path) {
   }
 }
 
-void followMany(bool jerk, bool fed, int paths, double edges = 0.1) {
-  Decades decades(static_cast<unsigned>(7 + 2 * jerk + fed), edges);
+void followMany(bool jerk, bool fed, int paths, double edges = 0.1,
+                std::optional<double> farthest = {}) {
+  Decades decades(static_cast<unsigned>(7 + 2 * jerk + fed), edges, farthest);
   int followed = 0;
   for (int i = 0; i < paths; ++i) {
     const Drawn drawn = decades.path(jerk, fed);
     SCOPED_TRACE("path " + std::to_string(i) + ": " + drawn.text);
     PlannedPath path;
     try {
-      path = test::planned(drawn.request, drawn.axes);
+      path = test::planned(drawn.request, drawn.axes, drawn.begin);
       if (fed) {
         const double from = decades.number(0.0, 1.0) * path.duration();
         path = test::fed(path, drawn.appended, from);
@@ -263,6 +298,15 @@ TEST(PathDecades, AreFollowedAtTheEdgesOfAllLimits) {
   followMany(false, false, 1000, 0.7);
   followMany(true, false, 500, 0.7);
   followMany(true, true, 100, 0.7);
+}
+// The farther an axis is from 0, the more its places are rounded, and the farther apart its knots
+// have to be.
+TEST(PathDecades, AreFollowedBesideAnAxisThatHardlyMoves) {
+  for (const double edges : {0.1, 0.7}) {
+    followMany(false, false, 300, edges, 6.0);
+    followMany(true, false, 100, edges, 3.0);
+    followMany(false, true, 100, edges, 6.0);
+  }
 }
 
 }  // namespace

@@ -65,16 +65,23 @@ struct PlannedPath {
   double duration() const { return curves.front()->duration().value(); }
 };
 
-/// The path as the machine plans it, from rest at 0.
+/// The path as the machine plans it, from rest.
+/// @param places [microsteps] where the first axes rest; the others rest at 0.
 inline PlannedPath planned(const motion::PathRequest& request,
-                           const std::vector<motion::PathAxis>& axes) {
+                           const std::vector<motion::PathAxis>& axes,
+                           const std::vector<double>& places = {}) {
   PlannedPath made;
-  made.plan = motion::planPath(request, axes, std::vector<motion::PathOrigin>(axes.size()));
-  const std::vector<motion::MotionState> rest(axes.size());
+  std::vector<motion::PathOrigin> origins(axes.size());
+  std::vector<motion::MotionState> rest(axes.size());
+  std::vector<motion::PathStart> starts(axes.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    origins[i] = {places[i], places[i] / axes[i].steps_per_unit};
+    rest[i].position = starts[i].motor.position = places[i];
+  }
+  made.plan = motion::planPath(request, axes, origins);
   const auto prepared =
       std::make_shared<const motion::PreparedTrajectory>(axes, made.plan.points, rest);
-  made.path =
-      motion::PreparedTrajectory::join(prepared, std::vector<motion::PathStart>(axes.size()));
+  made.path = motion::PreparedTrajectory::join(prepared, starts);
   const auto& trajectory = dynamic_cast<const motion::TrajectoryPath&>(*made.path);
   for (const auto& member : trajectory.members()) made.curves.push_back(member.curve);
   return made;
