@@ -53,10 +53,10 @@ constexpr double kMostLeftOut = 0.01;    // relative to the resolution
 // How far a cubic that leaves out knots may be beside the path, relative to the resolution, and the
 // parts of its duration at whose ends that is looked at.
 constexpr double kMostBeside = 0.05;
-constexpr int kLooks = 8;
+constexpr int kParts = 8;
 // Where a cubic is farther from it, the motion is slowed down by this factor, at most so many
 // times.
-constexpr double kSlowerBy = 1.5;
+constexpr double kSlowerBeside = 1.5;
 constexpr int kMostSlowed = 40;
 constexpr int kMostDivisions = 4;
 constexpr std::size_t kPartsOfDivided = 2;
@@ -237,8 +237,8 @@ class Knots {
         lowest = std::min(lowest, place);
         highest = std::max(highest, place);
       }
-      for (int k = 1; k < kLooks; ++k) {
-        const double time = from.time + (to.time - from.time) * k / kLooks;
+      for (int k = 1; k < kParts; ++k) {
+        const double time = from.time + (to.time - from.time) * k / kParts;
         const double place = cubicAt(from, to, time, j).position;
         if (std::max(lowest - place, place - highest) > kMostBeside * resolution_) return true;
       }
@@ -744,7 +744,7 @@ bool slowDownBeside(const PathGrid& grid, Reachability& speed, const Knots& knot
     if (!knots.leavesPath(i)) continue;
     const std::size_t last = knots.interval(i);
     for (std::size_t k = std::min(knots.intervalAfter(i - 1), last); k <= last; ++k) {
-      const double highest = std::max(knots.beginSpeed(k), knots.endSpeed(k)) / kSlowerBy;
+      const double highest = std::max(knots.beginSpeed(k), knots.endSpeed(k)) / kSlowerBeside;
       if (grid[k].straight || highest == 0.0 || knots.hasRoom(k)) continue;
       speed.restrict(k, highest * highest, std::numeric_limits<double>::infinity());
       any = true;
