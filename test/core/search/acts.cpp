@@ -253,6 +253,14 @@ std::vector<Act> makeActs() {
       {"switch the tool on", [](Participants& all, int client) { all.switchTool(client, true); }},
       {"switch the tool off", [](Participants& all, int client) { all.switchTool(client, false); }},
       inTurn("the position of y switches the tool", comparesTool),
+      {"probe with x",
+       [](Participants& all, int client) { all.postProbing(client, {kX}, {0.008}, false); }},
+      {"probe with x and y, away",
+       [](Participants& all, int client) {
+         all.postProbing(client, {kX, kY}, {-0.006, 0.005}, true);
+       }},
+      {"latch at the probe", [](Participants& all, int client) { all.beginLatch(client); }},
+      {"end the latch", [](Participants& all, int client) { all.endLatches(client); }},
   };
 }
 

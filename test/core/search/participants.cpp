@@ -40,6 +40,15 @@ constexpr const char* kTool = "tool";
 constexpr config::PositionCompare::Cam kToolCam{-0.001, 0.001};
 /// That is y.
 constexpr std::size_t kCompared = 1;
+/// An input with a name, which the carriage of x presses between two places. [mm]
+constexpr const char* kProbeInput = "probe";
+constexpr double kPressedFrom = 3.0;
+constexpr double kPressedTo = 12.0;
+/// How often a client looks whether a stroke of its probing has ended.
+constexpr pulse::Nanoseconds kProbeLook = 5 * kMillisecond;
+/// [m/s] The touches.
+constexpr double kFirstTouch = 0.05;
+constexpr double kSecondTouch = 0.01;
 /// The period of a stream of jogs, and their number.
 constexpr pulse::Nanoseconds kJogPeriod = 10 * kMillisecond;
 constexpr int kJogs = 12;
@@ -156,6 +165,11 @@ machine::MachineOptions optionsOf(int variant) {
   if (variant == 0) tool.at_stop = false;
   if (variant == kSharing) tool.max_on_ns = 20 * kMillisecond;
   options.outputs.push_back(tool);
+  config::InputConfig probe;
+  probe.name = kProbeInput;
+  probe.line = {kProbeInput, true, Bias::kAsIs};
+  if (variant == 2) probe.debounce_ns = 2 * kMillisecond;
+  options.inputs.push_back(probe);
   return options;
 }
 
@@ -196,6 +210,14 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
       spec.max_switch->position = 16.0;
       spec.settling_ns = 5 * kMillisecond;
       if (config.brake) spec.load_falls = kLoadFalls;
+      if (spec.name == configs[0].name) {
+        sim::SwitchSpec probe;
+        probe.line = kProbeInput;
+        probe.active_level = true;
+        probe.position = kPressedFrom;
+        probe.end = kPressedTo;
+        spec.flags.push_back(probe);
+      }
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
       if (isEngineLate(schedule) || latestPlayOf(schedule) > 0) {
@@ -729,6 +751,11 @@ void Participants::noteGoals(Ask& asked) {
     asked.together = true;
     asked.relative = line->relative;
     asked.ways = line->positions;
+  } else if (const auto* stroke = std::get_if<machine::ProbeStroke>(&asked.request)) {
+    asked.goals = stroke->line.axes;
+    asked.together = true;
+    asked.relative = stroke->line.relative;
+    asked.ways = stroke->line.positions;
   } else if (const auto* trajectory = std::get_if<machine::FollowTrajectory>(&asked.request)) {
     asked.goals = trajectory->axes;
     asked.together = true;
@@ -1368,6 +1395,163 @@ void Participants::switchTool(int client, bool on) {
        {});
 }
 
+machine::BeginLatch Participants::latchOf(const std::vector<std::size_t>& axes,
+                                          machine::LatchEdge edge) {
+  machine::BeginLatch latch;
+  latch.id = ++calls_;
+  latch.wanted.input = kProbeInput;
+  latch.wanted.edge = edge;
+  latch.axes = axes;
+  latch.record = std::make_shared<machine::LatchRecord>();
+  latches_.emplace_back(latch.id, latch.record);
+  return latch;
+}
+
+// One that was refused has no result.
+void Participants::forgetLatch(std::uint64_t id) {
+  latches_.erase(std::find_if(latches_.begin(), latches_.end(),
+                              [id](const auto& latch) { return latch.first == id; }));
+}
+
+void Participants::postProbing(int client, const std::vector<std::size_t>& axes,
+                               const std::vector<double>& ways, bool away) {
+  const auto snapshot = controller_->snapshot();
+  ProbingUnderWay probing;
+  probing.stroke.line.axes = axes;
+  probing.stroke.line.positions = ways;
+  probing.stroke.line.relative = true;
+  probing.meaning.moves = true;
+  // A stop ends all of its strokes.
+  probing.meaning.as_of = oracle_.moment();
+  for (const std::size_t axis : axes) {
+    probing.stroke.stops.push_back(snapshot->axes.at(axis).stopsOtherThanHolds());
+    probing.meaning.axes[axis] = true;
+  }
+  probing.edge = away ? machine::LatchEdge::kInactive : machine::LatchEdge::kActive;
+  postStroke(client, std::move(probing));
+}
+
+void Participants::postStroke(int client, ProbingUnderWay probing) {
+  machine::ProbeStroke& stroke = probing.stroke;
+  stroke.is_first = probing.strokes == 0;
+  stroke.line.velocity = probing.strokes == 0 ? kFirstTouch : 0.0;
+  if (probing.strokes == 2) stroke.line.velocity = kSecondTouch;
+  stroke.latch.reset();
+  if (probing.strokes != 1) stroke.latch = latchOf(stroke.line.axes, probing.edge);
+  const machine::ProbeStroke posted = stroke;
+  post(client, "stroke of a probing", posted, probing.meaning);
+  clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
+    if (reply.failure) {
+      if (posted.latch) forgetLatch(posted.latch->id);
+      return;
+    }
+    ProbingUnderWay begun = probing;
+    const auto& moves = std::get<std::vector<axis::Move>>(reply.value);
+    begun.outcome = moves.front().outcome;
+    if (probing.strokes == 0) {
+      const auto snapshot = controller_->snapshot();
+      for (std::size_t i = 0; i < moves.size(); ++i) {
+        begun.targets.push_back(moves[i].target);
+        begun.begin.push_back(snapshot->axes.at(posted.line.axes[i]).memory.position);
+      }
+    }
+    awaitStroke(client, begun);
+  };
+}
+
+void Participants::awaitStroke(int client, const ProbingUnderWay& probing) {
+  Client& who = clients_[static_cast<std::size_t>(client)];
+  who.from = clock_.now() + kProbeLook;
+  who.next = [=] {
+    const auto ended = probing.outcome->get();
+    const bool touches = probing.strokes != 1;
+    const auto latched = touches ? probing.stroke.latch->record->result() : std::nullopt;
+    const bool is_held = controller_->snapshot()->axes.front().state.held;
+    if (!ended || (touches && !latched) || is_held) return awaitStroke(client, probing);
+    strokeEnded(client, probing, *ended);
+  };
+}
+
+void Participants::strokeEnded(int client, ProbingUnderWay probing, const axis::MoveResult& ended) {
+  if (probing.strokes == 1) {
+    if (ended.end != axis::MoveEnd::kReached) return;
+    probing.strokes = 2;
+    probing.stroke.line.continueTo(probing.targets);
+    return postStroke(client, std::move(probing));
+  }
+  const machine::LatchResult latched = *probing.stroke.latch->record->result();
+  if (!latched.latched) {
+    if (ended.message.find("contact") != std::string::npos) {
+      oracle_.complain("a probing has no contact, but ends: " + ended.message);
+    }
+    return;
+  }
+  checkEdge(*latched.edge);
+  if (probing.strokes == 2 || ended.end != axis::MoveEnd::kStopped) return;
+  // Half of the way back.
+  std::vector<double> back;
+  for (std::size_t i = 0; i < probing.begin.size(); ++i) {
+    probing.contact.push_back(latched.edge->axes.at(i).position);
+    back.push_back(0.5 * (probing.contact[i] + probing.begin[i]));
+  }
+  probing.strokes = 1;
+  probing.stroke.line.continueTo(back);
+  postStroke(client, std::move(probing));
+}
+
+void Participants::beginLatch(int client) {
+  machine::BeginLatch latch = latchOf({0, 1, 2}, machine::LatchEdge::kEither);
+  latch.wanted.every = true;
+  post(client, "latch", latch, {});
+  clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
+    if (reply.failure) forgetLatch(latch.id);
+  };
+}
+
+void Participants::endLatches(int client) {
+  for (const auto& [id, record] : latches_) {
+    if (record->result()) continue;
+    return post(client, "end a latch", machine::EndLatch{id}, {});
+  }
+}
+
+// The probe is pressed by the step of x that reaches it, and the position is half a step before
+// that. Where the time at which a step is made isn't the planned one, nor is the place.
+void Participants::checkEdge(const machine::LatchedEdge& edge) {
+  const machine::LatchedAxis& x = edge.axes.front();
+  if (x.name != configs_[0].name || !x.position_valid || position_changed_) return;
+  if (!schedule_.deviations.empty() || schedule_.ahead) return;
+  if (steps_failed_[0] || chip_broke_[0] || power_was_lost_) return;
+  const auto snapshot = controller_->snapshot();
+  const double step = 1e3 * roundingOf(0) / snapshot->axes[0].steps_per_unit;  // [mm]
+  const double place = 1e3 * x.position;
+  const double beside = std::min(std::abs(place - kPressedFrom), std::abs(place - kPressedTo));
+  if (beside <= kHullTolerance * step) return;
+  oracle_.complain(fmt::format("the probe has changed at {} mm, but is pressed from {} to {} mm",
+                               place, kPressedFrom, kPressedTo));
+}
+
+// Nobody waits for a latch in vain.
+void Participants::checkLatches() {
+  const auto latches = latches_;  // clients play on meanwhile
+  for (const auto& [id, record] : latches) {
+    std::uint64_t number = 0;
+    for (const machine::LatchedEdge& edge : record->take()) {
+      if (edge.number != ++number) {
+        oracle_.complain(fmt::format("edge {} of a latch is its number {}", number, edge.number));
+      }
+      checkEdge(edge);
+    }
+    if (!closed_) ask("end a latch", machine::EndLatch{id}, {});
+    const auto result = record->result();
+    if (!result) {
+      oracle_.complain("a latch has no result in the end");
+    } else if (givesNoReason(result->message) || result->edges != number) {
+      oracle_.complain(fmt::format("a latch has {} edges, but ends: {}", number, result->message));
+    }
+  }
+}
+
 void Participants::compareTool(int client) {
   config::PositionCompare compare;
   compare.axis = configs_[kCompared].name;
@@ -1853,6 +2037,7 @@ std::vector<std::string> Participants::run() {
   if (oracle_.complaints.empty()) checkCounts("at rest");
   if (oracle_.complaints.empty()) checkRest();
   if (oracle_.complaints.empty()) checkCompared();
+  if (oracle_.complaints.empty()) checkLatches();
   for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);
   if (oracle_.complaints.empty()) {
     loses_edges_ = false;

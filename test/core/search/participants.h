@@ -155,6 +155,13 @@ class Participants : private machine::ShellCore::Host {
   /// @param size of the segment; 0: none, only that this is the end.
   void appendToPath(int client, std::size_t axis, double size, bool is_last);
   void switchTool(int client, bool on);
+  /// Probes along a line of axes, goes back from the contact, and touches it again slowly. The
+  /// carriage of x presses the probe. @param ways [m] of each axis
+  void postProbing(int client, const std::vector<std::size_t>& axes,
+                   const std::vector<double>& ways, bool away);
+  /// Latches where all axes are at each edge of the probe, until endLatches().
+  void beginLatch(int client);
+  void endLatches(int client);
   /// The position of y switches the tool: a cam around where it begins.
   void compareTool(int client);
   void emergencyStop(int client);
@@ -267,6 +274,24 @@ class Participants : private machine::ShellCore::Host {
   void prepareAndPost(int client, const Wish& wish, int tries);
   void followPath(int client, const std::vector<std::size_t>& axes, double size,
                   motion::PathRequest request);
+  /// A probing under way: its touches, and the way back between them.
+  struct ProbingUnderWay {
+    machine::ProbeStroke stroke;
+    machine::LatchEdge edge = machine::LatchEdge::kActive;
+    Meaning meaning;
+    std::vector<double> begin;  // [m]
+    std::vector<double> targets;
+    std::vector<double> contact;
+    int strokes = 0;
+    std::shared_ptr<const axis::Outcome<axis::MoveResult>> outcome;
+  };
+  void postStroke(int client, ProbingUnderWay probing);
+  void awaitStroke(int client, const ProbingUnderWay& probing);
+  void strokeEnded(int client, ProbingUnderWay probing, const axis::MoveResult& ended);
+  machine::BeginLatch latchOf(const std::vector<std::size_t>& axes, machine::LatchEdge edge);
+  void forgetLatch(std::uint64_t id);
+  void checkEdge(const machine::LatchedEdge& edge);
+  void checkLatches();
   void postStreamedJog(int client, std::size_t axis, const machine::Jog& jog, std::uint64_t as_of,
                        int left);
   void postStreamedSetpoints(int client, const machine::FollowSetpoints& setpoints,
@@ -369,6 +394,7 @@ class Participants : private machine::ShellCore::Host {
   std::uint64_t input_stops_ = 0;
   bool engine_reads_inputs_ = false;
   std::vector<activity::AcceptedHoming> homings_;
+  std::vector<std::pair<std::uint64_t, std::shared_ptr<machine::LatchRecord>>> latches_;
   bool position_changed_ = false;
   std::array<Hull, kAxes> hulls_;
   std::array<axis::AxisLimits, kAxes> lowest_limits_{};
