@@ -59,8 +59,9 @@ std::string PositionLatches::look(const activity::Context& context, Open& open) 
   for (const activity::InputEdges::Edge& edge : open.edges.poll(context)) {
     if (!open.over) latch(context, edge, open);
   }
-  const auto& motion = open.subject.stops;
-  const bool moves = motion != nullptr && !motion->get();
+  const auto& motion = open.subject.motion;
+  const auto outcome = motion ? motion->lock() : nullptr;
+  const bool moves = outcome != nullptr && !outcome->get();
   if (open.over) {
     conclude(open, "the positions were latched");
     return moves ? "the contact that it probed for has come" : "";
@@ -72,7 +73,7 @@ std::string PositionLatches::look(const activity::Context& context, Open& open) 
     conclude(open, why);
     return why;
   }
-  if (motion != nullptr && !moves && open.edges.due() == pulse::kNever) {
+  if (motion && !moves && open.edges.due() == pulse::kNever) {
     open.over = true;
     conclude(open, "the motion has ended before a contact");
   }

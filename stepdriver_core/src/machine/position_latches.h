@@ -30,8 +30,9 @@ class PositionLatches {
     double to = 0.0;
     std::shared_ptr<LatchRecord> record;
     /// The motion of a probing: its axes come to rest at the edge, or if the input can't be read.
-    /// The latch ends with it. Empty: the latch only looks on.
-    std::shared_ptr<const axis::Outcome<axis::MoveResult>> stops;
+    /// The latch ends with it, and if it is refused: then nobody keeps its outcome. Empty: the
+    /// latch only looks on.
+    std::optional<std::weak_ptr<const axis::Outcome<axis::MoveResult>>> motion;
   };
 
   /// Axes that must come to rest now, and why, in words.

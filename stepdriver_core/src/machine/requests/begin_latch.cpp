@@ -13,7 +13,7 @@ std::string BeginLatch::text(const AxisWords& words) const {
 }
 
 void BeginLatch::begin(RequestContext& machine,
-                       const std::shared_ptr<const axis::Outcome<axis::MoveResult>>& stops) const {
+                       std::optional<std::weak_ptr<const Outcome>> motion) const {
   PositionLatches::Subject subject;
   subject.id = id;
   subject.input = printable(wanted.input);
@@ -26,7 +26,7 @@ void BeginLatch::begin(RequestContext& machine,
     subject.to = wanted.window->to;
   }
   subject.record = record;
-  subject.stops = stops;
+  subject.motion = std::move(motion);
   subject.axes.front()->refuseUnlessOpen();
   machine.latches.begin(machine.context, std::move(subject), machine.named.inputs.edgesOf(input));
 }

@@ -23,10 +23,11 @@ struct BeginLatch {
 
   static constexpr bool kReadsInputs = true;
   std::string text(const AxisWords& words) const;
+  using Outcome = axis::Outcome<axis::MoveResult>;
+
   void serve(RequestContext& machine, const SharedCall& /*call*/) const { begin(machine, {}); }
-  /// @param stops see PositionLatches::Subject; may be empty.
-  void begin(RequestContext& machine,
-             const std::shared_ptr<const axis::Outcome<axis::MoveResult>>& stops) const;
+  /// @param motion see PositionLatches::Subject; may be empty.
+  void begin(RequestContext& machine, std::optional<std::weak_ptr<const Outcome>> motion) const;
 };
 
 }  // namespace stepdriver::machine
