@@ -418,5 +418,23 @@ TEST(SkewedAxes, JogToTheirSoftLimitsToHalfAMicrostepOfEachMotor) {
   }
 }
 
+// The end of a move that a stop comes for is between the axis's own counts: it rests there all the
+// same, and not on the nearest one.
+TEST(SkewedAxes, AStopNextToATargetRestsOnIt) {
+  for (int i = 0; i < 40; ++i) {
+    std::vector<config::AxisConfig> axes{test::linearAxis("x", 40'000.0, 0.1, 1.0),
+                                         test::linearAxis("y", 40'000.0, 0.1, 1.0)};
+    test::share(axes, {{1.0, 0.5}, {0.25, -1.0}});
+    Bench bench(axes);
+    for (const auto& axis : bench.machine->axes()) axis->setPosition(0.0);
+    axis::Axis& x = bench.axis("x");
+    const axis::Move move = x.moveTo(0.003 + i * 1.7e-6);
+    bench.machine->advance(move.duration - 0.002 - 0.0005 * (i % 5));
+    x.stop();
+    while (x.state().moving) bench.machine->advance(1e-3);
+    EXPECT_NEAR(x.state().position, move.rest, 1e-9) << "target " << i;
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver
