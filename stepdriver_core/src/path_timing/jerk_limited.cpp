@@ -989,11 +989,27 @@ class StopChoice {
     std::size_t first = 0;
     for (const std::size_t last : stops) {
       const Path part = stopped.part(first, last);
-      runs.push_back({first, last,
-                      JerkLimitedSection(part, limits_, rest)
-                          .throughCorners({speeds.begin() + static_cast<std::ptrdiff_t>(first),
-                                           speeds.begin() + static_cast<std::ptrdiff_t>(last)})});
-      rest.before += runs.back().plan.duration();
+      Run run{first, last,
+              JerkLimitedSection(part, limits_, rest)
+                  .throughCorners({speeds.begin() + static_cast<std::ptrdiff_t>(first),
+                                   speeds.begin() + static_cast<std::ptrdiff_t>(last)})};
+      // A slowdown as a whole isn't known to the look-ahead.
+      std::vector<Run> stopping;
+      if (first < last && run.plan.slowdown > 1.0 + kNoExcess) {
+        stopping = throughCorners(part, rest, std::vector<double>(last - first, 0.0));
+      }
+      if (stopping.empty() || run.plan.duration() <= durationOf(stopping)) {
+        stopping.clear();
+        stopping.push_back(std::move(run));
+        stopping.back().first = 0;
+        stopping.back().last = last - first;
+      }
+      rest.before += durationOf(stopping);
+      for (Run& each : stopping) {
+        each.first += first;
+        each.last += first;
+        runs.push_back(std::move(each));
+      }
       first = last + 1;
     }
     return runs;

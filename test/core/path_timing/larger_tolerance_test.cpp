@@ -121,6 +121,7 @@ TEST(LargerTolerance, MakesFewJerkLimitedMotionsLonger) {
   GrowthOfDurations growth(Continuity::kCurvature);
   growth.tryPaths(pathsToTry(40));
   EXPECT_LE(growth.growing(), 0.2 * growth.paths()) << growth.text();
+  EXPECT_LE(growth.worst(), 1.2) << growth.text();
   RecordProperty("growing", growth.growing());
   RecordProperty("worst", std::to_string(growth.worst()));
 }
