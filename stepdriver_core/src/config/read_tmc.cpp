@@ -117,10 +117,10 @@ class TmcReader {
 
   /// Its speed is read by readTmcSpeeds().
   void readStallFault(TmcConfig& config) {
-    constexpr const char* kKey = "stall_fault_threshold";
-    const int threshold = reader_.integer(kKey, 0, kMostThreshold, 0);
-    if (!reader_.has(kKey)) return;
-    refuseUnlessDetected(kKey, config);
+    constexpr const char* kThreshold = "stall_fault_threshold";
+    const int threshold = reader_.integer(kThreshold, 0, kMostThreshold, 0);
+    if (!reader_.has(kThreshold)) return;
+    refuseUnlessDetected(kThreshold, config);
     config.stall_fault.emplace();
     config.stall_fault->threshold = threshold;
   }
