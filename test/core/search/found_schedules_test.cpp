@@ -238,6 +238,16 @@ TEST(FoundSchedules, ASlowPathStaysWhereItIsSentTo) {
   }
 }
 
+// The second touch of the probing was refused after it had been taken; its latch ended a later move
+// that passed the contact.
+TEST(FoundSchedules, ATouchThatIsRefusedStopsNoLaterMove) {
+  for (int variant = 0; variant < static_cast<int>(kVariants); ++variant) {
+    for (const char* trouble : {"press x, edge lost", "switch of x can't be read"}) {
+      expectGood({variant, {does(0, 0, "probe with x"), does(1, 500, trouble)}, {}});
+    }
+  }
+}
+
 // In variants 1 and 2, x has a brake.
 TEST(FoundSchedules, AnEnableDoesNotSucceedIfAStopComesWhileTheBrakeIsReleased) {
   for (const int variant : {1, 2}) {
