@@ -29,9 +29,11 @@
 #include "common/node_start.h"
 #include "node/actions/action_topics.h"
 #include "node/actions/homing_action.h"
+#include "node/actions/latching_action.h"
 #include "node/actions/line_action.h"
 #include "node/actions/move_actions.h"
 #include "node/actions/path_action.h"
+#include "node/actions/probing_action.h"
 #include "node/actions/trajectory_action.h"
 #include "node/calls/call_queues.h"
 #include "node/diagnostics/diagnostics.h"
@@ -119,7 +121,7 @@ std::string usage() {
 /// @return the exit code.
 int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_actions,
              LineAction& line_action, PathAction& path_action, TrajectoryAction& trajectory_action,
-             StatePublisher& publisher, EndDespiteMaster& end) {
+             LatchingAction& latching_action, StatePublisher& publisher, EndDespiteMaster& end) {
   int exit_code = kExitOk;
   try {
     machine.shutdown();
@@ -138,6 +140,7 @@ int shutDown(machine::Machine& machine, CallQueues& queues, MoveActions& move_ac
   line_action.reportEnded();
   path_action.reportEnded();
   trajectory_action.reportEnded();
+  latching_action.reportEnded();
   if (!machine.whyHung().empty()) {
     // All that reads or releases lines would wait for the chip.
     ROS_FATAL_NAMED("node",
@@ -229,8 +232,9 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   node.setCallbackQueue(&queues.control());
   private_node.setCallbackQueue(&queues.control());
   StatePublisher publisher(node, private_node, machine, config.joint_state_rate);
-  const IoPublisher io_publisher(private_node, machine, hardware.clock(),
-                                 hardware.simulation() != nullptr ? config.simulation.speed : 1.0);
+  const MachineTime time(hardware.clock(),
+                         hardware.simulation() != nullptr ? config.simulation.speed : 1.0);
+  const IoPublisher io_publisher(private_node, machine, time);
   MasterDirectory directory;
   LatchedMessages latched(directory);
   ActionTopics topics(private_node, parameters.action_status_frequency, latched);
@@ -250,6 +254,8 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   MoveActions move_actions(private_node, machine, queues, topics);
   LineAction line_action(private_node, machine, queues, topics);
   PathAction path_action(private_node, machine, queues, topics);
+  LatchingAction latching_action(private_node, machine, queues, topics, time);
+  const ProbingAction probing_action(private_node, machine, topics);
   const MachineHomeService machine_home_service(private_node, machine, queues);
   MachineServices machine_services(private_node, machine, queues);
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
@@ -295,7 +301,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   ServiceManager::notifyEnding();
   master_watch.stop();
   const int exit_code = shutDown(machine, queues, move_actions, line_action, path_action,
-                                 trajectory_action, publisher, end);
+                                 trajectory_action, latching_action, publisher, end);
   if (hardware.simulation() != nullptr) warnOfTrace(*hardware.simulation());
   return exit_code;
 }

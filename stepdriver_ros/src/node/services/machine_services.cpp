@@ -8,6 +8,7 @@
 #include <stepdriver/FollowPath.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/PlanPath.h>
+#include <stepdriver/Probe.h>
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SetOutput.h>
 #include <stepdriver/SetPositionCompare.h>
@@ -24,6 +25,7 @@
 #include "node/line_request.h"
 #include "node/path_request.h"
 #include "node/position_compare_request.h"
+#include "node/probe_request.h"
 #include "respond.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
@@ -191,7 +193,19 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
                           ahead.more_follows ? "" : " to the end of the path");
         });
       };
+  const boost::function<bool(Probe::Request&, Probe::Response&)> probe =
+      [&machine](Probe::Request& request, Probe::Response& response) {
+        return respond(response, [&] {
+          machine::ProbeResult result = machine.probe(probeRequest(request));
+          response.success = result.succeeded;
+          response.message = std::move(result.message);
+          response.contact = !result.contact.empty();
+          response.contact_position = std::move(result.contact);
+          response.position = std::move(result.positions);
+        });
+      };
   node_.setCallbackQueue(&queues_.lines());
+  servers_.push_back(advertiseBounded(node_, "probe", probe));
   servers_.push_back(advertiseBounded(node_, "move_line", line));
   servers_.push_back(advertiseBounded(node_, "follow_path", path));
   servers_.push_back(advertiseBounded(node_, "plan_path", plan));

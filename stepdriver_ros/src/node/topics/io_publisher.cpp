@@ -15,13 +15,12 @@ constexpr int kIoQueueSize = 100;
 
 }  // namespace
 
-IoPublisher::IoPublisher(ros::NodeHandle node, machine::Machine& machine, pulse::Clock& clock,
-                         double speed)
-    : machine_(machine), clock_(clock), speed_(speed) {
+IoPublisher::IoPublisher(ros::NodeHandle node, machine::Machine& machine, const MachineTime& time)
+    : machine_(machine), time_(time) {
   publisher_ = node.advertise<IoStates>("io_states", kIoQueueSize, true);
   const machine::IoStates states = machine.ioStates();
   if (states.outputs.empty() && states.inputs.empty()) {
-    publish({states, ros::Time::now(), 0});
+    publish({states, time_.now()});
     return;
   }
   machine_.onIoChange([this](const machine::IoStates& changed) { add(changed); });
@@ -41,7 +40,7 @@ IoPublisher::~IoPublisher() {
 }
 
 void IoPublisher::add(const machine::IoStates& states) {
-  Change change{states, ros::Time::now(), clock_.now()};
+  Change change{states, time_.now()};
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (changes_.size() >= kMostChanges) changes_.pop_front();
@@ -66,9 +65,9 @@ void IoPublisher::run() {
 
 void IoPublisher::publish(const Change& change) {
   IoStates message;
-  message.header.stamp = change.time;
+  message.header.stamp = change.seen.ros;
   const auto time_of = [&](const std::optional<pulse::Nanoseconds>& time) {
-    return time ? rosTime(change, *time) : ros::Time();
+    return time ? time_.at(*time, change.seen) : ros::Time();
   };
   for (const machine::OutputState& output : change.states.outputs) {
     message.output_name.push_back(output.name);
@@ -87,13 +86,6 @@ void IoPublisher::publish(const Change& change) {
     message.input_error.push_back(input.error);
   }
   publisher_.publish(message);
-}
-
-// Without a clock of ROS that follows the rig's, a change has the time at which it was seen here.
-ros::Time IoPublisher::rosTime(const Change& change, pulse::Nanoseconds time) const {
-  double ago = static_cast<double>(change.now - time) * 1e-9;
-  if (!ros::Time::isSimTime()) ago = speed_ > 0.0 ? ago / speed_ : 0.0;
-  return change.time.toSec() > ago ? change.time - ros::Duration(ago) : ros::Time(0, 1);
 }
 
 }  // namespace stepdriver::ros_node

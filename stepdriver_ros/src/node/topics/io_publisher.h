@@ -8,8 +8,8 @@
 #include <mutex>
 #include <thread>
 
+#include "node/machine_time.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::ros_node {
 
@@ -18,9 +18,8 @@ namespace stepdriver::ros_node {
 class IoPublisher {
  public:
   /// @param node the node's private handle.
-  /// @param machine, clock outlive the publisher.
-  /// @param speed of the clock: its seconds per second; 0: it doesn't follow the time.
-  IoPublisher(ros::NodeHandle node, machine::Machine& machine, pulse::Clock& clock, double speed);
+  /// @param machine, and the clock of the time, outlive the publisher.
+  IoPublisher(ros::NodeHandle node, machine::Machine& machine, const MachineTime& time);
   /// Publishes what is left, and ends the thread.
   ~IoPublisher();
   IoPublisher(const IoPublisher&) = delete;
@@ -29,18 +28,15 @@ class IoPublisher {
  private:
   struct Change {
     machine::IoStates states;
-    ros::Time time;              // of ROS,
-    pulse::Nanoseconds now = 0;  // and of the machine
+    MachineTime::Now seen;
   };
 
   void add(const machine::IoStates& states);
   void run();
   void publish(const Change& change);
-  ros::Time rosTime(const Change& change, pulse::Nanoseconds time) const;
 
   machine::Machine& machine_;
-  pulse::Clock& clock_;
-  const double speed_;
+  const MachineTime time_;
   ros::Publisher publisher_;
 
   std::mutex mutex_;
