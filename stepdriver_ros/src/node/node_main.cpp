@@ -84,14 +84,14 @@ the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dum
               ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~enable  ~home
               ~move_line  ~follow_path  ~append_path  ~plan_path  ~hold  ~resume  ~dump
-              ~set_output  ~set_position_compare
+              ~set_output  ~set_position_compare  ~probe
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               ~rig/inputs/NAME (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~AXIS/driver  ~state
-              ~io_states  /diagnostics  /clock (with ~publish_clock)
+              ~io_states  ~latched_positions  /diagnostics  /clock (with ~publish_clock)
               ~jog  ~setpoint  ~AXIS/setpoint  ~command  (subscribed)
   actions     ~AXIS/move  ~AXIS/homing  ~homing  ~move_line  ~follow_path
-              ~follow_joint_trajectory
+              ~follow_joint_trajectory  ~latch  ~probe
   parameters  {}robot_description
 
 Exit codes: 0 ended as asked, 1 wrong configuration, 2 a GPIO line can't be requested or
