@@ -15,7 +15,7 @@
 namespace stepdriver::pulse {
 namespace {
 
-constexpr Nanoseconds kMillisecond = 1'000'000;
+constexpr Nanoseconds kMs = 1'000'000;
 
 const std::vector<CoilSet> kHalf = {0b0011, 0b0010, 0b0110, 0b0100, 0b1100, 0b1000, 0b1001, 0b0001};
 const std::vector<CoilSet> kFull = {0b0011, 0b0110, 0b1100, 0b1001};
@@ -36,7 +36,7 @@ class CoilPortTest : public testing::Test {
     port->listen(*ear);
   }
   void put(std::size_t channel, int direction, MotorSet still = 0) {
-    clock.waitUntil(clock.now() + kMillisecond);
+    clock.waitUntil(clock.now() + kMs);
     port->put({channel, direction, clock.now(), still});
     EXPECT_LE(port->due(), clock.now());
     port->serve(clock.now());
