@@ -13,7 +13,7 @@
 namespace stepdriver::sim {
 namespace {
 
-constexpr std::int64_t kMillisecond = 1'000'000;
+constexpr std::int64_t kMs = 1'000'000;
 
 class RigPhases : public testing::Test {
  protected:
@@ -39,7 +39,7 @@ class RigPhases : public testing::Test {
 
   /// One write of all coils, 20 ms after the last one.
   void set(driver::CoilSet coils) {
-    time += 20 * kMillisecond;
+    time += 20 * kMs;
     std::vector<gpio::LineWrite> writes;
     for (int i = 0; i < 4; ++i) writes.push_back({i, (coils & (1 << i)) != 0});
     ASSERT_EQ(lines->write(writes.data(), writes.size()), 0);
@@ -121,7 +121,7 @@ TEST_F(RigPhases, ReportsACoilThatIsLeftOn) {
 
 TEST_F(RigPhases, ReportsStepsThatAreTooCloseOrTooSoon) {
   set(0b0011);
-  time += 1 * kMillisecond;
+  time += 1 * kMs;
   const gpio::LineWrite off{0, false};
   lines->write(&off, 1);
   EXPECT_EQ(count(Violation::kStepAfterEnable), 1);
@@ -147,7 +147,7 @@ TEST(RigFullSteps, TakesTwoCoilsOfOneWriteAsAStepAndNoSingleCoil) {
   const auto lines = backend.request(
       {{"A", false, false}, {"B", false, false}, {"C", false, false}, {"D", false, false}}, {});
   const auto write = [&](const std::vector<gpio::LineWrite>& writes) {
-    time += 20 * kMillisecond;
+    time += 20 * kMs;
     ASSERT_EQ(lines->write(writes.data(), writes.size()), 0);
   };
   write({{0, true}, {1, true}});
