@@ -319,6 +319,11 @@ const driver::DriverChip& AxisModel::chipAt(std::size_t motor_index) const {
   return (motor_index == 0 ? *this : *sharers_.at(motor_index - 1)).config.driver;
 }
 
+motor::TmcChip* AxisModel::registersAt(std::size_t motor_index) {
+  if (sharers_.empty()) return motor.tmcAt(motor_index);
+  return (motor_index == 0 ? *this : *sharers_.at(motor_index - 1)).motor.tmcAt(0);
+}
+
 int AxisModel::readInput(int line) const {
   const int level = inputs.level(line);
   if (level < 0) throw GpioError(config.name + ": " + failureText({-level, line, true}));

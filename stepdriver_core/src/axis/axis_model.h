@@ -156,6 +156,8 @@ class AxisModel {
   /// @name The driver of a motor of the axis, or of those that it shares: its own is the first one
   /// @{
   const driver::DriverChip& chipAt(std::size_t motor_index) const;
+  /// Its serial port; nullptr: it has none.
+  motor::TmcChip* registersAt(std::size_t motor_index);
   /// "the A4988", and of which motor if there are several.
   std::string chipText(std::size_t motor_index) const;
   /// @}

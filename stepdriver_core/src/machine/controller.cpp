@@ -209,7 +209,7 @@ void Controller::update(axis::AxisModel& axis, const pulse::ChannelState& state)
                     axis.chipAt(state.chip_at_fault).fault_name),
         kChipRemedy);
     axis.distrust();
-    if (motor::TmcChip* chip = axis.motor.tmcAt(state.chip_at_fault)) {
+    if (motor::TmcChip* chip = axis.registersAt(state.chip_at_fault)) {
       chip->asks_for_cause = true;
       chip->polling = 0;  // one under way may have been answered before that
       chip->next_poll = context_.now;

@@ -15,9 +15,9 @@ TEST(ReadPower, TakesAnIdleTimeoutOnlyWithThePinThatItNeeds) {
   EXPECT_EQ(config.idle_timeout, 30.0);
   EXPECT_EQ(config.idle_action, IdleAction::kDisable);
   EXPECT_FALSE(config.holds_position_unpowered);
-  expectIssues(good,
-               {{"idle_timeout_s", -1.0, "is -1.0, but must be from 0 to 86400"},
-                {"idle_action", std::string("off"), "is \"off\", but must be disable or sleep"}});
+  expectIssues(good, {{"idle_timeout_s", -1.0, "is -1.0, but must be from 0 to 86400"},
+                      {"idle_action", std::string("off"),
+                       "is \"off\", but must be disable, sleep or lower_current"}});
   ConfigValue sleeps = good;
   put(sleeps, "idle_action", std::string("sleep"));
   EXPECT_EQ(issuesOfX(sleeps),
