@@ -1831,7 +1831,7 @@ void Participants::checkCompared() {
   const pulse::OutputLineState tool = engine_->output(0);
   const pulse::ChannelState y = engine_->channel(static_cast<int>(kCompared));
   if (tool.compare == 0 || tool.muted || tool.too_long || y.following != 0 || pins_failed_) return;
-  const config::OutputConfig& config = optionsOf(schedule_.variant).outputs[0];
+  const config::OutputConfig config = optionsOf(schedule_.variant).outputs[0];
   if (clock_.now() < tool.changed + config.min_on_ns) return;
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes[kCompared];
