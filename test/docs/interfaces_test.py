@@ -123,12 +123,14 @@ def actions(topics):
 
 def latched(name):
     """Whether the publisher of a topic says in its connection header that it is latched."""
-    heard = []
-    subscriber = rospy.Subscriber(name, rospy.AnyMsg, heard.append)
-    while not heard and not rospy.is_shutdown():
+    # Not in that of a message: some topics have none until something happens.
+    subscriber = rospy.Subscriber(name, rospy.AnyMsg)
+    headers = []
+    while not headers and not rospy.is_shutdown():
         rospy.sleep(0.05)
+        headers = [each.header for each in subscriber.impl.connections if each.header]
     subscriber.unregister()
-    return heard[0]._connection_header.get("latching") == "1"
+    return headers[0].get("latching") == "1"
 
 
 def topics(types, published):
@@ -152,8 +154,9 @@ def topics(types, published):
         subscribed = "(subscribed)" in said[name][0]
         if subscribed == (name in published):
             yield f"topic {name} is {'published' if subscribed else 'subscribed'}"
-        if not subscribed and latched(name) != ("latched" in said[name][3]):
-            yield f"topic {name} is{' not' if 'latched' in said[name][3] else ''} latched"
+        is_said = said[name][3].startswith("latched")
+        if not subscribed and latched(name) != is_said:
+            yield f"topic {name} is{' not' if is_said else ''} latched"
         fields = set(roslib.message.get_message_class(types[name]).__slots__)
         for field in sorted(fields_in(said[name][2]) - fields):
             yield f"topic {name} has no field {field}"
