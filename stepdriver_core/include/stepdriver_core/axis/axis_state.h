@@ -118,7 +118,7 @@ struct AxisState {
   /// sleep, a fault, an emergency stop), or ended that (a resume, an enable, a wake, a recover).
   std::uint64_t stops = 0;
   /// Why the position that was kept over a restart can't be trusted, or why one that is valid is
-  /// doubtful (config::FlagCheck::kWarning); empty: there is no such reason.
+  /// doubtful (kWarning of config::FlagCheck); empty: there is no such reason.
   std::string position_note;
   /// Of each motor whose chip has a serial port, what the chip said last; nullptr: no chip has one.
   std::shared_ptr<const std::vector<driver::DriverState>> drivers;

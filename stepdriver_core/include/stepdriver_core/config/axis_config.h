@@ -56,7 +56,7 @@ struct Pin {
 };
 
 /// The lines to the pins of a driver chip. ms1 to ms3 are M0 to M2 on a DRV8825. On a driver with
-/// CW and CCW inputs, step is CW and dir is CCW. A driver with driver::StepInputs::kPhases has
+/// CW and CCW inputs, step is CW and dir is CCW. A driver with coils (kPhases) has
 /// in1 to in4 alone.
 struct Pins {
   Pin step, dir, enable, ms1, ms2, ms3, sleep, reset, in1, in2, in3, in4;
@@ -117,8 +117,6 @@ enum class HomingKind {
   kStall,   ///< the place where its driver chip detects a stall, see TmcConfig::stall
 };
 
-/// How an axis finds its zero: at its trigger point. A unit is m on a linear axis, rad on a rotary
-/// one.
 /// What it means if the flag of a homing comes at another place later.
 enum class FlagCheck {
   kNone,     ///< nothing looks
@@ -126,6 +124,8 @@ enum class FlagCheck {
   kFault,    ///< the axis has a fault, and its position can't be trusted
 };
 
+/// How an axis finds its zero: at its trigger point. A unit is m on a linear axis, rad on a rotary
+/// one.
 struct HomingConfig {
   HomingKind kind = HomingKind::kLimit;
   /// The switch is the max endstop, or of other kinds, the axis moves towards max; false: min.

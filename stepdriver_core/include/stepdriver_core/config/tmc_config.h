@@ -50,7 +50,7 @@ struct TmcConfig {
   double run_current = 0.0;     ///< [A rms] of a coil, in motion
   double hold_current = 0.0;    ///< [A rms] at rest, hold_delay after the last step
   double hold_delay = 0.5;      ///< [s]
-  /// [A rms] at rest after the idle timeout, with IdleAction::kLowerCurrent.
+  /// [A rms] at rest after the idle timeout, with kLowerCurrent of IdleAction.
   std::optional<double> idle_current;
   ChopperMode mode = ChopperMode::kStealthChop;
   /// [full steps/s] With kStealthChop: above this speed of the motor it chops as kSpreadCycle does;

@@ -59,7 +59,7 @@ enum class StepInputs {
   kPhases,   ///< IN1 to IN4 switch the coils of a motor: a step is their next pattern
 };
 
-/// The inputs of a driver with StepInputs::kPhases, each of a coil.
+/// The inputs of a driver with kPhases, each of a coil.
 constexpr std::size_t kCoils = 4;
 /// Coils that have current, a bit for each: the lowest is that of IN1.
 using CoilSet = std::uint8_t;

@@ -94,9 +94,8 @@ class Lines {
   virtual const std::string& inputName(int input) const = 0;
 
   /// What has happened to the chip of a line that can't be used any more, in words, if more is
-  /// known of it than the errno of a call; else empty. For any thread.
-  ///
-  /// @param input whether `line` is the index of an input, else of an output.
+  /// known of it than the errno of a call; else empty. The line is an input or an output, by its
+  /// index. For any thread.
   virtual std::string failureText(bool /*input*/, int /*line*/) const { return {}; }
 
   /// The number of an output's chip, which is the same for all outputs of a chip: a chip that hangs

@@ -39,6 +39,7 @@ enum class ProbeEnd {
   kFailed,  ///< something else ended it: a stop, a fault, an endstop, another command
 };
 
+/// What a probing has found, and where the axes stand after it.
 struct ProbeResult {
   ProbeEnd end = ProbeEnd::kFailed;
   bool succeeded = false;         ///< there was a contact, or it need not be
