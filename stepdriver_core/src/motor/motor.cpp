@@ -7,6 +7,18 @@
 #include "input_shaping.h"
 
 namespace stepdriver::motor {
+namespace {
+
+// Those of the motions after one that the engine has accepted: it may not have begun them yet.
+void addAfter(MotionHistory& history, const Motions& motions, std::uint64_t serial,
+              const pulse::ChannelState& state) {
+  for (const Motion& motion : motions.all()) {
+    if (motion.serial <= serial || motion.serial > state.accepted) continue;
+    history.add({motion.planned.plan()->startNs(), true, motion.planned});
+  }
+}
+
+}  // namespace
 
 Motor::Motor(const config::AxisConfig& config, const MotorLines& lines, int channel)
     : channel_(channel),
@@ -54,15 +66,14 @@ void Motor::watchMotions() {
     now.motion = motion->planned;
     now.from = motion->planned.plan()->startNs();
   }
+  const bool is_first = !history_.isKept();
   history_.watch(std::move(now));
+  if (is_first) addAfter(history_, motions_, std::max(state_.following, state_.ended), state_);
 }
 
 // The counts of another microstep mode are those from now on.
 void Motor::remember(const pulse::ChannelState& before) {
-  for (const Motion& motion : motions_.all()) {
-    if (motion.serial <= before.accepted || motion.serial > state_.accepted) continue;
-    history_.add({motion.planned.plan()->startNs(), true, motion.planned});
-  }
+  addAfter(history_, motions_, before.accepted, state_);
   if (state_.ended != before.ended || state_.epoch != before.epoch) history_.add(restingPart());
 }
 
