@@ -47,7 +47,7 @@ FlagChecks::Check::Check(axis::AxisModel& checked, std::string its_flag,
                          activity::InputEdges its_edges, pulse::Nanoseconds debounce)
     : axis(&checked),
       flag(std::move(its_flag)),
-      edges(std::move(its_edges)),
+      edges(its_edges),
       delay(debounce + activity::InputEdges::kLongestReport + kFlagLookPeriod) {}
 
 FlagChecks::FlagChecks(const std::vector<std::unique_ptr<axis::AxisModel>>& axes) {

@@ -850,7 +850,7 @@ ProbeResult Machine::probe(const ProbeRequest& request, const std::function<bool
 
 Latch Machine::latch(const LatchRequest& request) {
   BeginLatch begin = impl_->latchOf(request);
-  const Latch latch{begin.id, begin.record};
+  Latch latch{begin.id, begin.record};
   ask(*impl_->shell_, std::move(begin));
   return latch;
 }

@@ -27,7 +27,7 @@ void PositionLatches::begin(const activity::Context& context, Subject subject,
     throw Refused(fmt::format("{} latches wait for edges already, the most at once", kMostOpen));
   }
   forEachWatched(subject, [](axis::AxisModel& axis) { axis.motor.watchMotions(); });
-  open_.push_back({std::move(subject), std::move(edges), {}, false});
+  open_.push_back({std::move(subject), edges, {}, false});
   open_.back().edges.begin(context);
 }
 
@@ -68,8 +68,8 @@ std::string PositionLatches::look(const activity::Context& context, Open& open) 
   }
   if (moves && open.edges.error() != 0) {
     open.over = true;
-    const std::string why = fmt::format("the input {} can't be read: {}", open.subject.input,
-                                        gpio::errorText(open.edges.error()));
+    std::string why = fmt::format("the input {} can't be read: {}", open.subject.input,
+                                  gpio::errorText(open.edges.error()));
     conclude(open, why);
     return why;
   }

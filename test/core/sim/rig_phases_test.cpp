@@ -123,11 +123,11 @@ TEST_F(RigPhases, ReportsStepsThatAreTooCloseOrTooSoon) {
   set(0b0011);
   time += 1 * kMs;
   const gpio::LineWrite off{0, false};
-  lines->write(&off, 1);
+  EXPECT_EQ(lines->write(&off, 1), 0);
   EXPECT_EQ(count(Violation::kStepAfterEnable), 1);
   time += 999;
   const gpio::LineWrite on{2, true};
-  lines->write(&on, 1);
+  EXPECT_EQ(lines->write(&on, 1), 0);
   EXPECT_EQ(count(Violation::kShortStepHigh), 1);
 }
 
