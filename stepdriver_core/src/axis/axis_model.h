@@ -85,8 +85,8 @@ class AxisModel {
   double jointAt(double motor_count) const;
   /// [microsteps] Where the joint was at a motion time, by its plans. @pre Motor::watchMotions()
   double jointAtTime(std::int64_t at) const;
-  /// 1 or -1: where the joint moved at a motion time; 0: it rested or turned within a millisecond
-  /// of that. @pre Motor::watchMotions()
+  /// 1 or -1: where the joint moved at a motion time; 0: it rested, or turned less than a
+  /// millisecond before or after it. @pre Motor::watchMotions()
   int directionAtTime(std::int64_t at) const;
   double positionNow() const { return positionOf(exactCount()); }
   /// A value with its unit, for messages.

@@ -59,9 +59,9 @@ class CoilPort final : public StepPort {
   std::vector<Places> places_;     // the numbers of the patterns of each channel's motors
   std::vector<Step> puts_;         // steps that haven't been played
   std::vector<Step> playing_;      // those that are being written
-  std::vector<std::size_t> ends_;  // of their writes
+  std::vector<std::size_t> ends_;  // where the writes of each of them end in writes_
   std::vector<std::pair<std::size_t, LineFailure>> failures_;  // by channel
-  std::vector<gpio::LineWrite> writes_;                        // of one serve()
+  std::vector<gpio::LineWrite> writes_;                        // those of one call of serve()
 };
 
 }  // namespace stepdriver::pulse

@@ -99,6 +99,12 @@ class ProbeTest : public testing::Test {
     request.velocity = 0.02;
     return request;
   }
+  static ProbeRequest inTwoTouches(double x) {
+    ProbeRequest request = towards(x);
+    request.second_velocity = 0.002;
+    request.back_off = 0.003;
+    return request;
+  }
 
   ProbeResult probe(const ProbeRequest& request, const std::function<bool()>& cancelled = {}) {
     return bench->machine->probe(request, cancelled);
@@ -119,9 +125,7 @@ TEST_F(ProbeTest, ComesToRestAfterTheContactAndKnowsItsPlace) {
 }
 
 TEST_F(ProbeTest, TouchesASecondTimeAndGoesBackToTheContact) {
-  ProbeRequest request = towards(0.05);
-  request.second_velocity = 0.002;
-  request.back_off = 0.003;
+  ProbeRequest request = inTwoTouches(0.05);
   request.returns = true;
   const ProbeResult result = probe(request);
   EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
@@ -276,12 +280,9 @@ TEST_F(ProbeTest, AHoldOnlyPutsOffTheContact) {
 
 // The hold comes while the axis decelerates from the contact, and ends when it has come to rest.
 TEST_F(ProbeTest, AHoldBetweenTwoTouchesOnlyPutsOffTheSecond) {
-  ProbeRequest request = towards(0.05);
-  request.second_velocity = 0.002;
-  request.back_off = 0.003;
   bool held = false;
   bool resumed = false;
-  const ProbeResult result = probe(request, [&] {
+  const ProbeResult result = probe(inTwoTouches(0.05), [&] {
     if (!held && bench->axis().state().position > 0.02) {
       held = true;
       bench->machine->hold();
@@ -319,11 +320,8 @@ TEST_F(ProbeTest, IsCancelledOnTheWayBack) {
 
 // Whoever stops the axis must find it at rest, and not see it leave for the next stroke.
 TEST_F(ProbeTest, AStopWhileItComesToRestEndsItWithoutAnotherStroke) {
-  ProbeRequest request = towards(0.05);
-  request.second_velocity = 0.002;
-  request.back_off = 0.003;
   bool done = false;
-  const ProbeResult result = probe(request, [&] {
+  const ProbeResult result = probe(inTwoTouches(0.05), [&] {
     if (!done && bench->axis().state().position > 0.02) {
       done = true;
       bench->axis().stop();

@@ -17,9 +17,12 @@ constexpr std::int64_t kMs = 1'000'000;
 
 class RigPhases : public testing::Test {
  protected:
-  RigPhases() : backend(rig, [this] { return time; }) { request(); }
+  explicit RigPhases(int microsteps = 2)
+      : rig({spec(microsteps)}), backend(rig, [this] { return time; }) {
+    request();
+  }
 
-  static RigAxisSpec spec() {
+  static RigAxisSpec spec(int microsteps) {
     RigAxisSpec x;
     x.name = "x";
     x.chip = driver::driverChip("uln2003");
@@ -27,7 +30,7 @@ class RigPhases : public testing::Test {
     x.in2.line = "B";
     x.in3.line = "C";
     x.in4.line = "D";
-    x.microsteps = 2;
+    x.microsteps = microsteps;
     x.full_step_travel = 2.0;
     return x;
   }
@@ -53,7 +56,7 @@ class RigPhases : public testing::Test {
   std::int64_t total() const { return rig.report("x").totalViolations(); }
 
   std::int64_t time = 0;
-  Rig rig{{spec()}};
+  Rig rig;
   gpio::SimulatedBackend backend;
   std::unique_ptr<gpio::Lines> lines;
 };
@@ -131,21 +134,12 @@ TEST_F(RigPhases, ReportsStepsThatAreTooCloseOrTooSoon) {
   EXPECT_EQ(count(Violation::kShortStepHigh), 1);
 }
 
-TEST(RigFullSteps, TakesTwoCoilsOfOneWriteAsAStepAndNoSingleCoil) {
-  std::int64_t time = 0;
-  RigAxisSpec x;
-  x.name = "x";
-  x.chip = driver::driverChip("uln2003");
-  x.in1.line = "A";
-  x.in2.line = "B";
-  x.in3.line = "C";
-  x.in4.line = "D";
-  x.microsteps = 1;
-  x.full_step_travel = 2.0;
-  Rig rig({x});
-  gpio::SimulatedBackend backend(rig, [&time] { return time; });
-  const auto lines = backend.request(
-      {{"A", false, false}, {"B", false, false}, {"C", false, false}, {"D", false, false}}, {});
+class RigFullSteps : public RigPhases {
+ protected:
+  RigFullSteps() : RigPhases(1) {}
+};
+
+TEST_F(RigFullSteps, TakesTwoCoilsOfOneWriteAsAStepAndNoSingleCoil) {
   const auto write = [&](const std::vector<gpio::LineWrite>& writes) {
     time += 20 * kMs;
     ASSERT_EQ(lines->write(writes.data(), writes.size()), 0);
