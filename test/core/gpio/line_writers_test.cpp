@@ -25,6 +25,8 @@ class HangingLines : public Lines {
  public:
   int write(const LineWrite* writes, std::size_t count) noexcept override {
     std::unique_lock<std::mutex> lock(mutex_);
+    ++begun_;
+    changed_.notify_all();
     changed_.wait(lock, [this] { return open_; });
     for (std::size_t i = 0; i < count; ++i) levels_[writes[i].output].push_back(writes[i].level);
     return 0;
@@ -43,6 +45,11 @@ class HangingLines : public Lines {
     open_ = open;
     changed_.notify_all();
   }
+  /// Waits until as many writes have begun.
+  void awaitBegun(int writes) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait(lock, [this, writes] { return begun_ >= writes; });
+  }
   std::vector<bool> levels(int output) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return levels_[output];
@@ -53,6 +60,7 @@ class HangingLines : public Lines {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool open_ = true;
+  int begun_ = 0;
   std::map<int, std::vector<bool>> levels_;
 };
 
@@ -67,6 +75,14 @@ class LineWritersTest : public testing::Test {
       for (const LineWriters::Done& done : writers_.collect()) errors_[done.id] = done.error;
       if (const auto ended = errors_.find(id); ended != errors_.end()) return ended->second;
     }
+  }
+  /// A write that hangs at its line until its time is over. A thread that begins late would find
+  /// that the time is over, and not make it.
+  void timeOut(std::uint64_t id, const LineWrite& write) {
+    lines_->setOpen(false);
+    writers_.write(id, write);
+    lines_->awaitBegun(1);
+    EXPECT_EQ(await(id), ETIMEDOUT);
   }
   /// All earlier writes have been made when this one has been.
   void flush() {
@@ -83,17 +99,13 @@ class LineWritersTest : public testing::Test {
 };
 
 TEST_F(LineWritersTest, MakeTheLineSafeAfterAWriteThatTimedOut) {
-  lines_->setOpen(false);
-  writers_.write(1, kOn);
-  EXPECT_EQ(await(1), ETIMEDOUT);
+  timeOut(1, kOn);
   flush();
   EXPECT_EQ(lines_->levels(0), (std::vector<bool>{true, false}));
 }
 
 TEST_F(LineWritersTest, MakeTheLineSafeIfTheSafeWriteTimedOutBehindAnother) {
-  lines_->setOpen(false);
-  writers_.write(1, kOn);
-  EXPECT_EQ(await(1), ETIMEDOUT);
+  timeOut(1, kOn);
   writers_.write(2, kOff);
   EXPECT_EQ(await(2), ETIMEDOUT);
   flush();
@@ -101,9 +113,7 @@ TEST_F(LineWritersTest, MakeTheLineSafeIfTheSafeWriteTimedOutBehindAnother) {
 }
 
 TEST_F(LineWritersTest, DoNotMakeAWriteThatTimedOutBehindAnother) {
-  lines_->setOpen(false);
-  writers_.write(1, {1, false});
-  EXPECT_EQ(await(1), ETIMEDOUT);
+  timeOut(1, {1, false});
   writers_.write(2, kOn);
   EXPECT_EQ(await(2), ETIMEDOUT);
   flush();
@@ -114,9 +124,7 @@ TEST_F(LineWritersTest, DoNotMakeAWriteThatTimedOutBehindAnother) {
 }
 
 TEST_F(LineWritersTest, LeaveTheLineToALaterWrite) {
-  lines_->setOpen(false);
-  writers_.write(1, kOn);
-  EXPECT_EQ(await(1), ETIMEDOUT);
+  timeOut(1, kOn);
   writers_.write(2, kOn);  // only collect() ends its time
   lines_->setOpen(true);
   while (!writers_.idle()) std::this_thread::yield();
