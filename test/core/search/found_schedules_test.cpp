@@ -282,5 +282,17 @@ TEST(FoundSchedules, ALineThatIsResumedWhileItStopsEndsAtItsTargetWithALowerJerk
   }
 }
 
+// The engine wasn't served for 8 ms after each step. It may catch up with a quarter of a full step
+// without sliding the timeline, and the judge had not added that to the 8 ms.
+TEST(FoundSchedules, AnEngineThatIsLateAgainAndAgainIsBehindByNoMoreThanItMayBe) {
+  for (const int variant : {1, 4}) {
+    for (const std::size_t from : {308, 333, 433, 434, 512}) {
+      expectGood({variant,
+                  {does(1, 2, "resume"), does(0, 16, "move y by 7 mm"), does(1, 16, "jog x and z")},
+                  {{from, Who::kEngine, 200}}});
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::search

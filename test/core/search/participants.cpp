@@ -200,6 +200,12 @@ pulse::Nanoseconds aheadOf(const Schedule& schedule) {
          latestPlayOf(schedule);
 }
 
+/// [microsteps, as configured] By so many steps a late engine may be behind without a slip of the
+/// timeline.
+double lateStepsOf(const config::AxisConfig& config) {
+  return machine::MachineOptions().late_steps * config.microsteps;
+}
+
 std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& configs,
                                     const Schedule& schedule) {
   std::vector<sim::RigAxisSpec> specs;
@@ -221,7 +227,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
       if (isEngineLate(schedule) || latestPlayOf(schedule) > 0) {
-        spec.limits->late = machine::MachineOptions().late_steps * config.microsteps;
+        spec.limits->late = lateStepsOf(config);
       }
       specs.push_back(spec);
     }
@@ -1742,9 +1748,11 @@ void Participants::checkLive(std::size_t axis) {
   const machine::AxisSnapshot& now = snapshot->axes.at(axis);
   const pulse::Nanoseconds time = clock_.now() - engine_->state().slipped;
   const axis::AxisState state = machine::stateOf(now, live, time, time);
-  // The engine and the board may be late, and a step is at the middle between two counts.
+  // The engine and the board may be late, and a step is at the middle between two counts. An engine
+  // that is late again has not yet caught up with what it was late before.
   const auto late = static_cast<double>(takingBack(schedule_) + kLatestPass + kMillisecond) * 1e-9;
-  const double most = 2.0 / now.steps_per_unit + config.max_speed * late;
+  const double behind = isEngineLate(schedule_) ? lateStepsOf(config) / config.steps_per_unit : 0.0;
+  const double most = 2.0 / now.steps_per_unit + behind + config.max_speed * late;
   if (std::abs(state.planned - state.position) > most) {
     oracle_.complain(fmt::format("{} stands at {} m, but is planned to be at {} m", config.name,
                                  state.position, state.planned));
