@@ -15,6 +15,7 @@
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
+#include "support/homing_bench.h"
 #include "support/refusal.h"
 
 // An axis that loses 30 microsteps at each reversal: 80 microsteps/mm, 1/16.
@@ -212,6 +213,28 @@ TEST_F(Backlash, EndsAJogAtTheSoftLimitOfTheJoint) {
   while (x().state().moving) bench->machine->advance(1e-3);
   EXPECT_DOUBLE_EQ(position(), 0.010);
   EXPECT_EQ(motor(), 800 + kBacklash);
+  expectClean();
+}
+
+// Its homing was stopped beyond the soft limit, to which it comes down.
+TEST_F(Backlash, IsOpenedIfAJogComesBackToTheSoftLimit) {
+  config::AxisConfig config = test::homingAxis();
+  config.backlash = kBacklash / config.steps_per_unit;
+  config.homing->at_max = true;
+  config.homing->offset = 0.1;
+  config.homing->pull_off = 0.03;
+  config.max_position = 0.08;
+  bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config});
+  const axis::HomingResult homing = x().home([this] { return position() > 0.09; });
+  ASSERT_EQ(homing.end, axis::HomingEnd::kCancelled) << homing.message;
+  while (x().state().moving) bench->machine->advance(1e-3);
+  ASSERT_GT(position(), 0.09);
+  x().jog(-0.05);
+  bench->machine->advance(0.1);
+  x().jog(0.05);
+  while (x().state().moving) bench->machine->advance(1e-3);
+  EXPECT_DOUBLE_EQ(position(), 0.08);
+  EXPECT_EQ(x().state().slack, 0.0);
   expectClean();
 }
 

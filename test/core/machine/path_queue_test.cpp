@@ -356,6 +356,26 @@ TEST_F(PathQueue, IsToldItsEndAfterAHoldAtRest) {
   }
 }
 
+// Nothing waits for the path any more: its axes may be given positions, and idle.
+TEST_F(PathQueue, LeavesItsAxesIdleIfItWasToldItsEndAfterAHoldAtRest) {
+  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+  for (config::AxisConfig& axis : axes) axis.idle_timeout = 2.0;
+  build(axes);
+  begin(test::circle(), 40);
+  awaitRest();
+  machine().hold();
+  machine().resume();
+  append({}, false);
+  const auto result = machine().result(move_);
+  ASSERT_TRUE(result) << "it never ends";
+  EXPECT_EQ(result->end, MoveEnd::kReached) << result->message;
+  for (const std::string name : {"x", "y"}) bench->axis(name).setPosition(0.0);
+  advance(1.9);
+  for (const std::string name : {"x", "y"}) EXPECT_FALSE(state(name).idle) << name;
+  advance(0.2);
+  for (const std::string name : {"x", "y"}) EXPECT_TRUE(state(name).idle) << name;
+}
+
 // The hold slows down without a jerk limit, and the rate had to be kept from falling to 0 within
 // one.
 TEST_F(PathQueue, ContinuesSoonIfItIsResumedWhileItSlowsDownAndHasALowerJerkLimit) {

@@ -310,6 +310,24 @@ TEST_F(Setpoints, ABacklashIsTakenUpAtEachTurn) {
   EXPECT_EQ(violationsOf(bench->report()), "");
 }
 
+// To join the stream, which rises, the axis would pass its soft limit. It goes straight to the last
+// position, which lies below it: the backlash is opened, not taken up.
+TEST_F(Setpoints, AStreamThatWouldLeadBeyondASoftLimitEndsOnItsPositionFromAbove) {
+  config::AxisConfig config = configOf("x");
+  config.backlash = 0.0005;
+  config.max_position = 0.05;
+  for (const double period : {0.001, 0.002, 0.003, 0.005}) {
+    build({config});
+    ASSERT_EQ(bench->move(0.04995).end, axis::MoveEnd::kReached);
+    expectTaken(SetpointMode::kPosition, 0.0496);
+    advance(period);
+    expectTaken(SetpointMode::kPosition, 0.0499);
+    advance(1.0);
+    EXPECT_NEAR(x().state().position, 0.0499, 1e-9) << period;
+    EXPECT_EQ(x().state().slack, 0.0) << period;
+  }
+}
+
 TEST_F(Setpoints, APositionAtWhichTheAxisStandsMovesNothing) {
   for (int i = 0; i < 20; ++i) {
     expectTaken(SetpointMode::kPosition, 0.0);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -19,28 +20,53 @@ bool isHomedToAStall(const std::vector<config::AxisConfig>& axes, const std::str
   });
 }
 
-class ShippedConfiguration : public testing::TestWithParam<const char*> {};
+class ShippedConfiguration : public testing::TestWithParam<const char*> {
+ protected:
+  static setup::MachineConfig read() {
+    setup::MachineConfig config = readFile(std::string(STEPDRIVER_CONFIGS "/") + GetParam(),
+                                           setup::BackendChoice::kSimulated);
+    config.simulation.speed = 0.0;
+    config.simulation.trace.clear();
+    config.state_file.clear();
+    return config;
+  }
 
-TEST_P(ShippedConfiguration, LosesNoStep) {
-  setup::MachineConfig config =
-      readFile(std::string(STEPDRIVER_CONFIGS "/") + GetParam(), setup::BackendChoice::kSimulated);
-  config.simulation.speed = 0.0;
-  config.simulation.trace.clear();
-  config.state_file.clear();
-  setup::Hardware hardware(config);
-  machine::MachineOptions options = config.options();
-  test::UnthreadedMachine machine(config.axes, hardware.backend(), hardware.clock(), options);
-  for (const config::AxisConfig& axis_config : config.axes) {
-    axis::Axis& axis = machine.axis(axis_config.name);
-    axis.enable(true);
-    if (axis_config.homing) {
+  /// Enables the axes; each that can be homed is.
+  void bringUp() {
+    for (const config::AxisConfig& axis_config : config.axes) {
+      axis::Axis& axis = machine.axis(axis_config.name);
+      axis.enable(true);
+      if (!axis_config.homing) continue;
       const axis::HomingResult homed = axis.home();
       EXPECT_EQ(homed.end, axis::HomingEnd::kHomed) << homed.message;
     }
-    const double range = axis_config.kind == config::Kind::kLinear ? 0.2 : 6.0;
-    const double low = axis_config.min_position.value_or(-range);
-    const double high = axis_config.max_position.value_or(range);
-    for (const double target : {low, high, 0.5 * (low + high)}) {
+  }
+
+  static double low(const config::AxisConfig& axis) {
+    return axis.min_position.value_or(-rangeOf(axis));
+  }
+  static double high(const config::AxisConfig& axis) {
+    return axis.max_position.value_or(rangeOf(axis));
+  }
+
+  setup::MachineConfig config = read();
+  setup::Hardware hardware{config};
+  test::UnthreadedMachine machine{config.axes, hardware.backend(), hardware.clock(),
+                                  config.options()};
+
+ private:
+  static double rangeOf(const config::AxisConfig& axis) {
+    return axis.kind == config::Kind::kLinear ? 0.2 : 6.0;
+  }
+};
+
+TEST_P(ShippedConfiguration, LosesNoStep) {
+  bringUp();
+  for (const config::AxisConfig& axis_config : config.axes) {
+    axis::Axis& axis = machine.axis(axis_config.name);
+    const double begin = low(axis_config);
+    const double end = high(axis_config);
+    for (const double target : {begin, end, 0.5 * (begin + end)}) {
       const axis::MoveResult result = axis.wait(axis.moveTo(target));
       EXPECT_EQ(result.end, axis::MoveEnd::kReached) << result.message;
     }
@@ -53,6 +79,23 @@ TEST_P(ShippedConfiguration, LosesNoStep) {
     EXPECT_EQ(seen.lost_steps, 0) << name << ", largest lag " << seen.largest_lag;
     EXPECT_GT(seen.largest_lag, 1.0) << name;
     EXPECT_LT(seen.largest_lag, 120.0) << name;
+  }
+}
+
+// A homing leaves microsteps beside the round positions, and these in the middle of two.
+TEST_P(ShippedConfiguration, ReachesTheEndsOfStraightLinesAfterItsHoming) {
+  bringUp();
+  motion::LineRequest line;
+  for (const config::AxisConfig& axis : config.axes) line.names.push_back(axis.name);
+  for (const double part : {0.5, 0.25, 0.3, 0.7, 0.4}) {
+    line.positions.clear();
+    for (const config::AxisConfig& axis : config.axes) {
+      const double at = low(axis) + part * (high(axis) - low(axis));
+      line.positions.push_back(0.001 * std::round(1e3 * at));
+    }
+    const machine::CoordinatedResult result = machine.wait(machine.moveLine(line));
+    EXPECT_EQ(result.end, axis::MoveEnd::kReached) << part << ": " << result.message;
+    EXPECT_NE(result.message, "");
   }
 }
 
