@@ -465,22 +465,24 @@ build_core_tsan() {
 build_node_asan() { build_sanitized asan stepdriver_node; }
 build_node_tsan() { build_sanitized tsan stepdriver_node; }
 
-# sanitize_core PRESET: runs the tests of the programs that are built.
+# sanitize_core PRESET EXCLUDED: runs the tests of the programs that are built, but those of a pattern.
 sanitize_core() {
   local preset=$1
   await "build_core_$preset"
   use_test_preset "$preset"
   # The number of schedules of each kind that the search samples.
-  STEPDRIVER_SCHEDULES=1000 ctest --test-dir "$build/catkin-$preset/stepdriver_core" -j "$jobs" --timeout 300 \
-    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$slow_tests"
+  STEPDRIVER_SCHEDULES=400 ctest --test-dir "$build/catkin-$preset/stepdriver_core" -j "$jobs" --timeout 300 \
+    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$2"
 }
 # Tests that take long with a sanitizer are excluded: searches, and random courses, of which others make
-# short ones. The search has one thread, so ThreadSanitizer has nothing to find in it.
+# short ones. The search and some other tests have one thread, so ThreadSanitizer has nothing to find in them.
 slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess|'\
 'RandomQueue.*BacklashJerk|RandomLines.WithAJerk|SmoothPathQueue.OfRandomLines|QueuedPath.NeedsMemory|'\
 'OfAStopARecoveryAndTwoOthers'
-sanitize_core_asan() { sanitize_core asan; }
-sanitize_core_tsan() { sanitize_core tsan; }
+tests_without_threads='^(FlagCheckTest|FormulaOnTheEngine|Path|PathDecades|PathQueue|ProbeTest|SmoothPath|'\
+'SmoothPathQueue|StallHoming|StreamedPoints|TmcStorm)\.|/StallHoming\.'
+sanitize_core_asan() { sanitize_core asan "$slow_tests"; }
+sanitize_core_tsan() { sanitize_core tsan "$slow_tests|$tests_without_threads"; }
 
 # sanitize_node PRESET TEST...: runs a storm and tests of --ros. Only the node that they start has the
 # sanitizer. It writes its findings to files, because not every test reads all that its node prints.
