@@ -165,6 +165,7 @@ Steps GoIdle::plan() {
 
 Steps Recover::plan() {
   axis::AxisModel& axis = *axes().front();
+  if (const std::string lost = axis.lostLineText(); !lost.empty()) axis.refuse("at fault: " + lost);
   Steps steps;
   // It stays off for a motor that is to have no current.
   if (axis.motor.power().wantsEnabled()) append(steps, powerSteps(context(), axis));

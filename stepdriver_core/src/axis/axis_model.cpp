@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <utility>
 
@@ -328,6 +329,15 @@ int AxisModel::readInput(int line) const {
   const int level = inputs.level(line);
   if (level < 0) throw GpioError(config.name + ": " + failureText({-level, line, true}));
   return level;
+}
+
+std::string AxisModel::lostLineText() const {
+  if (!lines.failure) return "";
+  for (std::size_t i = 0; i < motor.lines().motors(); ++i) {
+    const int step = motor.lines().motorAt(i).step;
+    if (step >= 0 && !lines.failure(false, step).empty()) return failureText({ENODEV, step, false});
+  }
+  return "";
 }
 
 std::string AxisModel::failureText(const pulse::LineFailure& failure) const {

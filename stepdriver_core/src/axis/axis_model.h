@@ -163,6 +163,8 @@ class AxisModel {
   /// @}
   /// A line that failed, in words.
   std::string failureText(const pulse::LineFailure& failure) const;
+  /// A STEP line whose chip can't be used any more, in words; empty: there is none.
+  std::string lostLineText() const;
 
   /// @name The driver chip
   /// @{ The motor was without current for a while.

@@ -60,9 +60,9 @@ class Machine::Impl {
     if (!options.state_file.empty()) keeper_ = std::make_unique<StateKeeper>(options.state_file);
     const Wiring wiring(configs, options);
     lines_ = backend.request(wiring.outputs, wiring.inputs);
-    if (auto* ports = dynamic_cast<pulse::PortBackend*>(&backend)) {
-      port_ = ports->makePort(*lines_, clock,
-                              pulse::PulseEngine::lanesOf(wiring.channels, wiring.shared));
+    if ((ports_ = dynamic_cast<pulse::PortBackend*>(&backend)) != nullptr) {
+      port_ = ports_->makePort(*lines_, clock,
+                               pulse::PulseEngine::lanesOf(wiring.channels, wiring.shared));
     }
     // What a port of its own plays doesn't depend on the times of this computer.
     if (options.measure && clock.realtime() && !port_) {
@@ -664,6 +664,7 @@ class Machine::Impl {
   std::shared_ptr<gpio::Lines> lines_;
   axis::LineNames names_;
   std::optional<pulse::Capability> capability_;
+  pulse::PortBackend* ports_ = nullptr;
   std::unique_ptr<pulse::StepPort> port_;  // empty: the engine writes the lines
   std::unique_ptr<FlightRecorder> recorder_;
   std::unique_ptr<pulse::PulseEngine> engine_;
@@ -812,7 +813,11 @@ void Machine::emergencyStop() {
 
 bool Machine::emergencyStopped() const { return impl_->engine_->emergencyStopped(); }
 
-void Machine::recover() { ask(*impl_->shell_, Recover{}); }
+void Machine::recover() {
+  // Before the inputs are read: they may be on a board that has failed.
+  if (impl_->ports_ != nullptr) impl_->ports_->restore(*impl_->lines_);
+  ask(*impl_->shell_, Recover{});
+}
 
 void Machine::enable(bool on) {
   Enable wanted{{}, on};

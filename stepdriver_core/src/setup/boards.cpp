@@ -75,9 +75,12 @@ std::vector<DriverFinding> checkBoards(const std::vector<BoardConfig>& boards) {
   for (const BoardConfig& config : boards) {
     try {
       pulse::SteadyClock clock;
-      klipper::Board board(
-          config.name, std::make_unique<klipper::TtyLink>(config.name, config.port, config.baud),
-          clock, {});
+      klipper::Board board(config.name,
+                           [&config] {
+                             return std::make_unique<klipper::TtyLink>(config.name, config.port,
+                                                                       config.baud);
+                           },
+                           clock, {});
       board.identify();
       findings.push_back(
           {true, fmt::format("{}: {} at {:g} MHz, firmware {}", config.name, board.mcu(),

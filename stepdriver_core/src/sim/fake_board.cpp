@@ -24,7 +24,7 @@ const char* const kFirmwareCommands[] = {
     "get_uptime",
     "emergency_stop",
     "clear_shutdown",
-    "config_reset",
+    "reset",
     "config_stepper oid=%c step_pin=%c dir_pin=%c invert_step=%c step_pulse_ticks=%u",
     "queue_step oid=%c interval=%u count=%hu add=%hi",
     "set_next_step_dir oid=%c dir=%c",
@@ -66,7 +66,6 @@ const char* const kReasons[] = {
     "Invalid oid type",
     "Already finalized",
     "Not a valid pin",
-    "config_reset only available when shutdown",
     "Unknown command",
 };
 
@@ -221,11 +220,14 @@ void FakeBoard::answer(const std::string& name, const std::vector<std::uint32_t>
 // ---- commands ----
 
 void FakeBoard::receive(const std::uint8_t* bytes, std::size_t count) {
-  is_reset_ = false;
   if (dictionary_.empty()) describe();
+  const std::uint64_t starts = starts_;
   for (const Bytes& block : wire_.receive(bytes, count)) {
     BoardReader reader(block);
-    while (!reader.isAtEnd()) handle(reader);
+    // Whatever shuts it down ends the block too.
+    const std::uint64_t shutdowns = shutdowns_;
+    while (!reader.isAtEnd() && starts == starts_ && shutdowns == shutdowns_) handle(reader);
+    if (starts != starts_) return;
     wire_.acknowledge();
   }
 }
@@ -252,17 +254,7 @@ void FakeBoard::handle(BoardReader& reader) {
                   {static_cast<std::uint32_t>(now_ >> 32), static_cast<std::uint32_t>(now_)});
   }
   if (name == "emergency_stop") return shutDown("Command request");
-  if (name == "config_reset") {
-    if (!shutdown_) return shutDown("config_reset only available when shutdown");
-    shutdown_.reset();
-    config_.reset();
-    oids_ = 0;
-    steppers_.clear();
-    trsyncs_.clear();
-    endstops_.clear();
-    outputs_.clear();
-    return;
-  }
+  if (name == "reset") return powerCycle();
   if (shutdown_) return answer("is_shutdown", {*shutdown_});
   if (!configures(name, arguments) && !steps(name, arguments) && !watches(name, arguments)) {
     shutDown("Unknown command");
@@ -520,6 +512,7 @@ void FakeBoard::sample(Endstop& endstop) {
 }
 
 void FakeBoard::shutDown(const std::string& reason) {
+  ++shutdowns_;
   if (shutdown_) return;
   reason_ = reason;
   shutdown_ = texts_.count(reason) != 0 ? texts_.at(reason) : 0;
@@ -547,6 +540,7 @@ void FakeBoard::powerCycle() {
   shutdown_.reset();
   oids_ = 0;
   wire_.reset();
+  ++starts_;
   if (!answers_.empty()) answer("starting", {});
 }
 

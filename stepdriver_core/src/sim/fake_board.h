@@ -58,7 +58,7 @@ class FakeBoard {
 
   /// At the time of the last play().
   void receive(const std::uint8_t* bytes, std::size_t count);
-  Bytes take() { return is_reset_ ? Bytes{} : wire_.take(); }
+  Bytes take() { return wire_.take(); }
   bool hasBytes() const { return wire_.hasBytes(); }
   void play(Nanoseconds now);
   /// When play() has something to do.
@@ -133,7 +133,8 @@ class FakeBoard {
   std::uint32_t oids_ = 0;
   std::optional<std::uint32_t> shutdown_;
   std::string reason_;
-  bool is_reset_ = false;
+  std::uint64_t starts_ = 0;  // after the first one
+  std::uint64_t shutdowns_ = 0;
   std::map<std::uint32_t, Stepper> steppers_;
   std::map<std::uint32_t, Trsync> trsyncs_;
   std::map<std::uint32_t, Endstop> endstops_;

@@ -4,9 +4,11 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
-#include <cstring>
+#include <thread>
 #include <utility>
 
 #include "gpio/chip_table.h"
@@ -20,6 +22,10 @@ constexpr Nanoseconds kLook = 10 * kMillisecond;
 // An answer may be lost: the question is repeated after so many looks.
 constexpr int kLooksUntilAskingAgain = 50;
 constexpr int kClockReadings = 8;
+constexpr int kLooksForDelivery = 30;
+// How long a board that was reset is looked for, and the pause before each look.
+constexpr auto kLongestReturn = std::chrono::seconds(10);
+constexpr auto kReturn = std::chrono::milliseconds(200);
 // The first seconds tell how fast its clock is: it is read more often then.
 constexpr Nanoseconds kFirstClockPeriod = 100 * kMillisecond;
 constexpr int kFirstClocks = 20;
@@ -33,17 +39,25 @@ constexpr std::size_t kMostDictionary = 1'000'000;
 
 }  // namespace
 
-Board::Board(std::string name, std::unique_ptr<Link> link, pulse::Clock& clock, Options options)
-    : name_(std::move(name)), link_(std::move(link)), clock_(clock), options_(options) {}
+Board::Board(std::string name, Open open, pulse::Clock& clock, Options options)
+    : name_(std::move(name)), open_(std::move(open)), clock_(clock), options_(options) {}
 
 // ---- at the start ----
+
+void Board::openLine() {
+  start_failure_.clear();
+  link_.reset();  // the port is locked as long as it is open
+  link_ = open_();
+  transport_ = Transport();
+}
 
 void Board::connect() {
   transport_.connect(clock_.now());
   for (int i = 0; i < kLooks; ++i) {
     transmit(clock_.now());
     link_->await(kLook);
-    receive(clock_.now());
+    receive();
+    throwIfFailed();
     if (transport_.isConnected() && transport_.isIdle()) return;
   }
   throw BoardError(
@@ -52,15 +66,22 @@ void Board::connect() {
                   name_));
 }
 
-void Board::identify() {
+void Board::throwIfFailed() const {
+  if (!start_failure_.empty()) throw BoardError(start_failure_);
+}
+
+std::vector<std::uint8_t> Board::readIdentity() {
+  openLine();
   connect();
+  std::vector<std::uint8_t> identity;
   for (;;) {
-    const std::size_t before = identity_.size();
+    const std::size_t before = identity.size();
     const Message question = klipper::identify(static_cast<std::uint32_t>(before));
     std::size_t last = kPiece;
-    for (int i = 0; i < kLooks && identity_.size() == before && last != 0; ++i) {
+    for (int i = 0; i < kLooks && identity.size() == before && last != 0; ++i) {
       if (i % kLooksUntilAskingAgain == 0) transport_.send(question.bytes.data(), question.size);
       transmit(clock_.now());
+      throwIfFailed();
       link_->await(kLook);
       std::array<std::uint8_t, 4096> bytes{};
       const auto count = link_->read(bytes.data(), bytes.size());
@@ -69,17 +90,21 @@ void Board::identify() {
             transport_.receive(bytes.data() + at, static_cast<std::size_t>(count - at)));
         while (const auto frame = transport_.next(clock_.now())) {
           const auto piece = identified(frame->content, frame->content + frame->size);
-          if (!piece || piece->offset != identity_.size()) continue;
-          identity_.insert(identity_.end(), piece->data, piece->data + piece->size);
+          if (!piece || piece->offset != identity.size()) continue;
+          identity.insert(identity.end(), piece->data, piece->data + piece->size);
           last = piece->size;
         }
       }
     }
-    if (last == 0) break;
-    if (identity_.size() == before || identity_.size() > kMostDictionary) {
+    if (last == 0) return identity;
+    if (identity.size() == before || identity.size() > kMostDictionary) {
       throw BoardError(fmt::format("the board {} doesn't say which firmware it has", name_));
     }
   }
+}
+
+void Board::identify() {
+  identity_ = readIdentity();
   dictionary_ = Dictionary::unpacked(identity_);
   messages_.emplace(dictionary_, name_);
   mcu_ = dictionary_.text("MCU");
@@ -135,8 +160,8 @@ std::optional<Heard> Board::exchange(Answer answer, std::optional<std::uint32_t>
   transmit(clock_.now());
   link_->await(kLook);
   awaited_.reset();
-  receive(clock_.now());
-  if (failure() != 0) throw BoardError(fmt::format("the board {}: {}", name_, reason()));
+  receive();
+  throwIfFailed();
   if (!awaited_ || awaited_->answer != answer || (oid && awaited_->arguments[0] != *oid)) {
     return std::nullopt;
   }
@@ -153,26 +178,59 @@ Heard Board::ask(Command command, std::initializer_list<std::uint32_t> arguments
   throw BoardError(fmt::format("the board {} doesn't answer to \"{}\"", name_, formatOf(command)));
 }
 
-void Board::resetConfiguration() {
-  const auto reset = dictionary_.command("config_reset");
-  if (!reset) {
+// Most firmwares know how to reset the whole chip; that of a Linux process begins anew.
+void Board::reset() {
+  auto command = dictionary_.command("reset");
+  if (!command) command = dictionary_.command("config_reset");
+  if (!command) {
     throw BoardError(fmt::format(
         "the board {} must be reset, and its firmware can't do that by itself: press its reset "
         "button, or switch it off and on",
         name_));
   }
+  // What is in a block behind a command that shuts the firmware down is lost.
   send(Command::kEmergencyStop, {});
+  awaitDelivery();
   std::array<std::uint8_t, 8> bytes{};
-  const std::uint8_t* end = bytes.data();
   std::uint8_t* out = bytes.data();
-  if (*reset >= -32 && *reset < 96) {
-    *out++ = static_cast<std::uint8_t>(*reset & 0x7F);
+  if (*command >= -32 && *command < 96) {
+    *out++ = static_cast<std::uint8_t>(*command & 0x7F);
   } else {
-    *out++ = static_cast<std::uint8_t>(((*reset >> 7) & 0x7F) | 0x80);
-    *out++ = static_cast<std::uint8_t>(*reset & 0x7F);
+    *out++ = static_cast<std::uint8_t>(((*command >> 7) & 0x7F) | 0x80);
+    *out++ = static_cast<std::uint8_t>(*command & 0x7F);
   }
-  end = out;
-  transport_.send(bytes.data(), static_cast<std::size_t>(end - bytes.data()));
+  transport_.send(bytes.data(), static_cast<std::size_t>(out - bytes.data()));
+  awaitDelivery();
+  comeBack();
+}
+
+// A board that resets itself may not be able to confirm that any more.
+void Board::awaitDelivery() {
+  for (int i = 0; i < kLooksForDelivery && !hasFailed() && !transport_.isIdle(); ++i) {
+    transmit(clock_.now());
+    link_->await(kLook);
+    receive();
+  }
+}
+
+// A port of USB goes when its board is reset, and needs some seconds to come back.
+void Board::comeBack() {
+  const auto end = std::chrono::steady_clock::now() + kLongestReturn;
+  for (;;) {
+    try {
+      return checkIdentity();
+    } catch (const BoardError&) {
+      if (std::chrono::steady_clock::now() > end) throw;
+    }
+    std::this_thread::sleep_for(kReturn);
+  }
+}
+
+void Board::checkIdentity() {
+  if (readIdentity() == identity_) return;
+  throw BoardError(
+      fmt::format("the board {} has another firmware now, instead of {}: start the node again",
+                  name_, version()));
 }
 
 void Board::configure() {
@@ -190,7 +248,7 @@ void Board::configure() {
                     name_, name_));
   }
   if (config.arguments[2] != 0 || is_foreign) {
-    resetConfiguration();
+    reset();
     config = ask(Command::kGetConfig, {}, Answer::kConfig);
     if (config.arguments[0] != 0 || config.arguments[2] != 0) {
       throw BoardError(fmt::format("the board {} can't be reset: switch it off and on", name_));
@@ -223,6 +281,35 @@ void Board::readClock() {
   clock_due_ = clock_.now() + kFirstClockPeriod;
 }
 
+// ---- after a failure ----
+
+void Board::release() {
+  Owner failed = Owner::kFailed;
+  owner_.compare_exchange_strong(failed, Owner::kNobody, std::memory_order_acq_rel);
+}
+
+void Board::reopen() {
+  listener_ = nullptr;
+  checkIdentity();
+  board_clock_ = std::make_unique<BoardClock>(board_clock_->nominal());
+  clock_asked_.reset();
+  clocks_ = 0;
+  outputs_due_ = 0;
+  for (Output& output : outputs_) output.level = output.at_shutdown;
+  configure();
+}
+
+void Board::resume() {
+  owner_.store(Owner::kServer, std::memory_order_relaxed);
+  resumed_.fetch_add(1, std::memory_order_relaxed);
+  failure_.store(0, std::memory_order_release);
+}
+
+void Board::stayFailed(const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(reason_mutex_);
+  reason_ = reason;
+}
+
 // ---- afterwards ----
 
 void Board::send(Command command, std::initializer_list<std::uint32_t> arguments) {
@@ -240,26 +327,29 @@ void Board::setOutput(std::uint32_t oid, bool level) {
 void Board::serve(Nanoseconds now) {
   if (failure() != 0) return;
   // What the board has said comes first: after a pause of this program it has long answered.
-  receive(now);
+  receive();
   if (failure() != 0) return;
   keepTime(now);
   keepOutputs(now);
   transmit(now);
-  receive(now);
+  receive();
   if (failure() == 0 && transport_.waitsSince() < now - kSilence) {
     fail(ETIMEDOUT, fmt::format("the board {} hasn't answered for 2 s", name_), now);
   }
 }
 
 void Board::failLine(int error, Nanoseconds now) {
-  fail(error, fmt::format("the line to the board {} has failed: {}", name_, gpio::errorText(error)),
-       now);
+  const std::string why = error == ENODEV ? "its port is gone: was its cable pulled, or its power?"
+                                          : gpio::errorText(error);
+  fail(error, fmt::format("the line to the board {} has failed: {}", name_, why), now);
 }
 
-void Board::receive(Nanoseconds now) {
+void Board::receive() {
   std::array<std::uint8_t, 4096> bytes{};
   for (;;) {
     const auto count = link_->read(bytes.data(), bytes.size());
+    // This thread may have waited for a processor: what the board says is newer than its last look.
+    const Nanoseconds now = clock_.now();
     if (count < 0) return failLine(static_cast<int>(-count), now);
     if (count == 0) return;
     for (std::ptrdiff_t at = 0; at < count;) {
@@ -271,7 +361,7 @@ void Board::receive(Nanoseconds now) {
         const std::uint8_t* end = content + frame->size;
         while (const auto heard = messages_->decode(content, end)) {
           hear(*heard, now);
-          if (failure() != 0) return;
+          if (hasFailed()) return;
         }
       }
     }
@@ -344,20 +434,32 @@ Nanoseconds Board::due(Nanoseconds now) const {
 }
 
 void Board::flush() {
-  for (int i = 0; i < kLooks / 10 && failure() == 0 && !transport_.isIdle(); ++i) {
-    transmit(clock_.now());
-    link_->await(kLook);
-    receive(clock_.now());
-  }
+  if (link_ && failure() == 0) awaitDelivery();
+}
+
+bool Board::hasFailed() const {
+  return listener_ == nullptr ? !start_failure_.empty() : failure() != 0;
 }
 
 void Board::fail(int error, const std::string& reason, Nanoseconds now) {
-  if (failure() != 0) return;
-  std::strncpy(reason_.data(), reason.c_str(), reason_.size() - 1);
+  if (hasFailed()) return;
+  if (listener_ == nullptr) {
+    start_failure_ = reason;
+    return;
+  }
+  {
+    const std::lock_guard<std::mutex> lock(reason_mutex_);
+    reason_ = reason;
+  }
+  owner_.store(Owner::kFailed, std::memory_order_relaxed);
   failure_.store(error, std::memory_order_release);
-  if (listener_ != nullptr) listener_->lost(now);
+  listener_->lost(now);
 }
 
-std::string Board::reason() const { return failure() == 0 ? "" : std::string(reason_.data()); }
+std::string Board::reason() const {
+  if (failure() == 0) return "";
+  const std::lock_guard<std::mutex> lock(reason_mutex_);
+  return reason_;
+}
 
 }  // namespace stepdriver::klipper

@@ -1,11 +1,12 @@
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ namespace stepdriver::klipper {
 
 /// A board: its firmware, its configuration, its clock, and the line to it.
 ///
-///     Board board("mcu", std::move(link), clock, {});
+///     Board board("mcu", open, clock, {});
 ///     board.identify();                             // what is it?
 ///     const auto oid = board.addStepper("gpio2", "gpio3", false, 24);
 ///     board.configure();                            // it has these objects from now on
@@ -29,10 +30,22 @@ namespace stepdriver::klipper {
 ///
 /// The functions until configure() wait for answers, and throw. All others don't wait, don't throw,
 /// and are for the thread that serves the board; failure() and reason() are for any thread.
+///
+/// A board that has failed belongs to nobody once that thread has called release(). Another thread
+/// may bring it back then:
+///
+///     if (board.isReleased()) {
+///       board.reopen();  // the same firmware, configured anew if it must be
+///       board.resume();  // the thread that serves it has it again
+///     }
 class Board {
  public:
+  /// Opens the line to the board. It throws BoardError if that isn't there.
+  using Open = std::function<std::unique_ptr<Link>()>;
+
   struct Options {
-    /// A board that another program has configured is reset instead of refused.
+    /// A board that another program has configured is reset instead of refused. One that has shut
+    /// down is reset in any case.
     bool resets_foreign = false;
   };
 
@@ -45,8 +58,9 @@ class Board {
     virtual void lost(Nanoseconds now) = 0;
   };
 
-  /// @param name of the configuration. @param clock outlives this.
-  Board(std::string name, std::unique_ptr<Link> link, pulse::Clock& clock, Options options);
+  /// @param name of the configuration. @param open is used again whenever the board was reset: its
+  ///   port may go then, and come back. @param clock outlives this.
+  Board(std::string name, Open open, pulse::Clock& clock, Options options);
 
   /// @name At the start
   /// @{
@@ -79,7 +93,24 @@ class Board {
   Heard ask(Command command, std::initializer_list<std::uint32_t> arguments, Answer answer);
   /// @}
 
-  /// @param listener nullptr: nobody.
+  /// @name After a failure
+  /// @{
+  /// If it has failed, the thread that serves it uses it no more until failure() is 0.
+  void release();
+  bool isReleased() const { return owner_.load(std::memory_order_acquire) == Owner::kNobody; }
+  /// Does what identify() and configure() do, by another line to the board. Its outputs have the
+  /// levels of addOutput() then. ask() works as at the start. @pre isReleased()
+  /// @throw BoardError if it isn't there, or has another firmware than before.
+  void reopen();
+  /// Ends the failure. @pre reopen() has succeeded.
+  void resume();
+  /// It is still failed, for this reason.
+  void stayFailed(const std::string& reason);
+  /// How often resume() was called.
+  std::uint64_t resumed() const { return resumed_.load(std::memory_order_relaxed); }
+  /// @}
+
+  /// @param listener nullptr: nobody, as at the start. Failures are thrown then.
   void listen(Listener* listener) { listener_ = listener; }
   void send(Command command, std::initializer_list<std::uint32_t> arguments);
   /// Sets an output from addOutput().
@@ -110,22 +141,37 @@ class Board {
     bool watched = false;
   };
 
+  void openLine();
   void connect();
+  std::vector<std::uint8_t> readIdentity();
+  void comeBack();
+  void checkIdentity();
+  void throwIfFailed() const;
   std::optional<Heard> exchange(Answer answer, std::optional<std::uint32_t> oid);
-  void resetConfiguration();
+  void reset();
+  void awaitDelivery();
   void add(Command command, std::initializer_list<std::uint32_t> arguments);
   void readClock();
-  void receive(Nanoseconds now);
+  void receive();
   void transmit(Nanoseconds now);
   void hear(const Heard& heard, Nanoseconds now);
   void keepTime(Nanoseconds now);
   void keepOutputs(Nanoseconds now);
+  /// Who may use the line to the board, and all that is known of it.
+  enum class Owner {
+    kServer,  ///< the thread that serves it
+    kFailed,  ///< still that thread, which doesn't know yet that the board has failed
+    kNobody   ///< whoever brings it back
+  };
+
+  bool hasFailed() const;
   void fail(int error, const std::string& reason, Nanoseconds now);
   /// The line to the board has failed with this errno.
   void failLine(int error, Nanoseconds now);
 
   const std::string name_;
-  const std::unique_ptr<Link> link_;
+  const Open open_;
+  std::unique_ptr<Link> link_;
   pulse::Clock& clock_;
   const Options options_;
   Listener* listener_ = nullptr;
@@ -142,10 +188,17 @@ class Board {
   Nanoseconds clock_due_ = 0;
   int clocks_ = 0;
   Nanoseconds outputs_due_ = 0;
-  std::optional<Heard> awaited_;  // at the start
+  /// @name At the start
+  /// @{
+  std::optional<Heard> awaited_;
   std::vector<std::uint8_t> identity_;
+  std::string start_failure_;
+  /// @}
   std::atomic<int> failure_{0};
-  std::array<char, 200> reason_{};
+  std::atomic<Owner> owner_{Owner::kServer};
+  std::atomic<std::uint64_t> resumed_{0};
+  mutable std::mutex reason_mutex_;  // the thread that serves the board takes it when it fails
+  std::string reason_;
 };
 
 }  // namespace stepdriver::klipper

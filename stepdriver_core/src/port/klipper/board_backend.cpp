@@ -6,9 +6,11 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include "gpio/edge_queue.h"
@@ -25,6 +27,8 @@ using gpio::LineWrite;
 constexpr Nanoseconds kInputPeriod = 20'000'000;
 constexpr std::size_t kMostWrites = 256;  // that wait for the thread of the port
 constexpr std::size_t kMostBaseWrites = 64;
+constexpr auto kReleaseLook = std::chrono::milliseconds(1);
+constexpr int kMostReleaseLooks = 1'000;
 
 }  // namespace
 
@@ -48,6 +52,11 @@ class BoardBackend::HeldLines final : public gpio::Lines {
     std::uint32_t oid = 0;
     int base = -1;
     std::atomic<int> level{0};
+  };
+
+  struct Write {
+    LineWrite line{};
+    std::uint64_t resumed = 0;  // Board::resumed() then
   };
 
   HeldLines(BoardBackend& backend, std::vector<std::unique_ptr<Board>> boards)
@@ -124,10 +133,14 @@ class BoardBackend::HeldLines final : public gpio::Lines {
         base[base_count++] = {output.base, writes[i].level};
         continue;
       }
-      if (!output.oid) return EINVAL;
       if (output.board->failure() != 0) return output.board->failure();
+      if (!output.oid) {
+        // STEP and DIR belong to the board, which keeps them at rest by itself.
+        if (writes[i].level != output.safe_level) return EINVAL;
+        continue;
+      }
       const std::lock_guard<std::mutex> lock(writers_);
-      if (!writes_.push(writes[i])) return EBUSY;
+      if (!writes_.push({writes[i], output.board->resumed()})) return EBUSY;
     }
     if (base_count != count) backend_.clock_.wake();
     return base_count == 0 ? 0 : base_->write(base.data(), base_count);
@@ -203,17 +216,32 @@ class BoardBackend::HeldLines final : public gpio::Lines {
       options.horizon = std::max(options.horizon, backend_.settings_[i].ahead);
       options.step_error = std::max(options.step_error, backend_.settings_[i].step_error);
     }
-    for (const auto& input : inputs_) {
-      if (input->board == nullptr) continue;
-      const Heard state =
-          input->board->ask(Command::kEndstopQueryState, {input->oid}, Answer::kEndstopState);
-      input->level = state.arguments[3] != 0 ? 1 : 0;
-    }
-    return std::make_unique<BoardPort>(
+    for (Board* board : boards) readInputs(*board);
+    auto port = std::make_unique<BoardPort>(
         boards, backend_.clock_, std::move(channels), options, [this] { sendWrites(); },
         [this](const Board& board, const Heard& heard, Nanoseconds now) {
           hear(board, heard, now);
         });
+    port_ = port.get();
+    return port;
+  }
+
+  void restore() {
+    const std::lock_guard<std::mutex> lock(restoring_);
+    for (const auto& each : boards_) {
+      Board& board = *each;
+      if (board.failure() == 0) continue;
+      try {
+        awaitRelease(board);
+        board.reopen();
+        port_->prepare(board);
+        readInputs(board);
+        board.resume();
+        backend_.clock_.wake();
+      } catch (const Error& error) {
+        board.stayFailed(error.what());
+      }
+    }
   }
 
  private:
@@ -231,6 +259,26 @@ class BoardBackend::HeldLines final : public gpio::Lines {
     }
     return nullptr;
   }
+  /// Until the thread that has seen the failure doesn't use the board any more.
+  void awaitRelease(Board& board) const {
+    for (int i = 0; !board.isReleased(); ++i) {
+      if (i == kMostReleaseLooks) {
+        throw BoardError(fmt::format("the board {} is still in use", board.name()));
+      }
+      backend_.clock_.wake();
+      std::this_thread::sleep_for(kReleaseLook);
+    }
+  }
+
+  void readInputs(Board& board) {
+    for (const auto& input : inputs_) {
+      if (input->board != &board) continue;
+      const Heard state =
+          board.ask(Command::kEndstopQueryState, {input->oid}, Answer::kEndstopState);
+      input->level = state.arguments[3] != 0 ? 1 : 0;
+    }
+  }
+
   static std::string pinOf(const std::string& line) { return line.substr(line.find(':') + 1); }
 
   // ---- the port ----
@@ -310,9 +358,12 @@ class BoardBackend::HeldLines final : public gpio::Lines {
   // ---- the thread of the port ----
 
   void sendWrites() {
-    while (const LineWrite* write = writes_.front()) {
-      const Output& output = outputs_[static_cast<std::size_t>(write->output)];
-      if (output.board->failure() == 0) output.board->setOutput(*output.oid, write->level);
+    while (const Write* write = writes_.front()) {
+      const Output& output = outputs_[static_cast<std::size_t>(write->line.output)];
+      // What was written to a board before it failed isn't made up for.
+      if (output.board->failure() == 0 && output.board->resumed() == write->resumed) {
+        output.board->setOutput(*output.oid, write->line.level);
+      }
       writes_.pop();
     }
     const Nanoseconds now = backend_.clock_.now();
@@ -347,7 +398,9 @@ class BoardBackend::HeldLines final : public gpio::Lines {
   std::unique_ptr<gpio::Lines> base_;
   gpio::EdgeQueue edges_;
   std::mutex writers_;
-  pulse::Mailbox<LineWrite, kMostWrites> writes_;
+  pulse::Mailbox<Write, kMostWrites> writes_;
+  std::mutex restoring_;
+  BoardPort* port_ = nullptr;  // outlived by this
   Nanoseconds inputs_due_ = 0;
 };
 
@@ -361,8 +414,9 @@ std::unique_ptr<gpio::Lines> BoardBackend::request(const std::vector<gpio::Outpu
                                                    const std::vector<gpio::InputRequest>& inputs) {
   std::vector<std::unique_ptr<Board>> boards;
   for (const BoardSettings& settings : settings_) {
-    boards.push_back(std::make_unique<Board>(settings.name, make_link_(settings), clock_,
-                                             Board::Options{settings.resets_foreign}));
+    boards.push_back(std::make_unique<Board>(
+        settings.name, [this, &settings] { return make_link_(settings); }, clock_,
+        Board::Options{settings.resets_foreign}));
     boards.back()->identify();
   }
   auto lines = std::make_unique<HeldLines>(*this, std::move(boards));
@@ -379,5 +433,7 @@ std::unique_ptr<pulse::StepPort> BoardBackend::makePort(
   }
   return held_->makePort(lanes);
 }
+
+void BoardBackend::restore(gpio::Lines& /*lines*/) { held_->restore(); }
 
 }  // namespace stepdriver::klipper

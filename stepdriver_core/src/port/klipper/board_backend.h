@@ -46,6 +46,7 @@ class BoardBackend final : public pulse::PortBackend {
   std::unique_ptr<pulse::StepPort> makePort(
       gpio::Lines& lines, pulse::Clock& clock,
       const std::vector<pulse::ChannelConfig>& lanes) override;
+  void restore(gpio::Lines& lines) override;
 
  private:
   class HeldLines;

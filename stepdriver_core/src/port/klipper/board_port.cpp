@@ -45,6 +45,8 @@ struct BoardPort::Track {
     std::int32_t told = 0;             // position by which steps were told to be played
     std::int32_t position = 0;         // the last one that the board has said
     bool is_new = false;               // it has said so since it was asked last
+    // Where it stands after a failure. Of the thread that brings the board back, until then.
+    std::int32_t resumes_at = 0;
   };
   Channel config;
   std::int64_t error = 1;  // [ticks]
@@ -55,12 +57,14 @@ struct BoardPort::Track {
   std::int64_t last_tick = 0;  // of the last step that was put
   int last_direction = 0;
   bool stepped = false;
+  bool is_lost = false;                       // steps were put while its board wasn't there
   bool sent = false;                          // some of the open steps are on the board
   bool armed = false;                         // the trsync can stop the motors
   int armed_for = 0;                          // the direction whose switches are watched
   std::optional<std::int64_t> disarms_other;  // from this tick on
   bool stopping = false;                      // it was told to stop, or has stopped
   bool has_stopped = false;
+  bool has_stalled = false;  // it was stopped because it had stopped by itself
   std::uint32_t stopped_by = kTakenBack;
   bool fails = false;  // the stop is a failure, and not an end of steps
   int error_number = 0;
@@ -89,7 +93,10 @@ BoardPort::BoardPort(std::vector<Board*> boards, pulse::Clock& clock, std::vecto
       options_(options),
       writes_(std::move(writes)),
       hears_(std::move(hears)),
-      entries_(boards_.size()) {
+      entries_(boards_.size()),
+      said_(boards_.size()),
+      resumed_(boards_.size()),
+      usable_(boards_.size(), 1) {
   for (Channel& channel : channels) {
     auto track = std::make_unique<Track>();
     track->config = std::move(channel);
@@ -128,9 +135,54 @@ void BoardPort::begin(std::size_t channel, const Manner& manner) {
   tracks_[channel]->still = manner.still;
 }
 
-std::size_t& BoardPort::entriesOf(const Board& board) {
+std::size_t BoardPort::indexOf(const Board& board) const {
   const auto found = std::find(boards_.begin(), boards_.end(), &board);
-  return entries_[static_cast<std::size_t>(found - boards_.begin())];
+  return static_cast<std::size_t>(found - boards_.begin());
+}
+
+// ---- boards that come back ----
+
+void BoardPort::prepare(Board& board) {
+  for (const auto& track : tracks_) {
+    if (track->config.board != &board) continue;
+    // A board that was never without power may still play.
+    board.send(Command::kTrsyncTrigger, {track->config.trsync, kTakenBack});
+    disarm(*track);
+    for (std::size_t i = 0; i < track->steppers.size(); ++i) {
+      const Heard position = board.ask(Command::kStepperGetPosition, {track->config.motors[i].oid},
+                                       Answer::kStepperPosition);
+      track->steppers[i].resumes_at = static_cast<std::int32_t>(position.arguments[1]);
+    }
+  }
+}
+
+// Whether the board works. It may have come back since this was asked last.
+bool BoardPort::isUsable(Board& board) {
+  const std::size_t index = indexOf(board);
+  usable_[index] = board.failure() == 0 ? 1 : 0;
+  if (usable_[index] != 0 && board.resumed() != resumed_[index]) takeOver(board);
+  return usable_[index] != 0;
+}
+
+// The same without a board that comes back in the middle of a pass.
+bool BoardPort::works(const Board& board) const {
+  return usable_[indexOf(board)] != 0 && board.failure() == 0;
+}
+
+void BoardPort::takeOver(Board& board) {
+  const std::size_t index = indexOf(board);
+  resumed_[index] = board.resumed();
+  entries_[index] = 0;
+  said_[index] = 0;
+  board.listen(ears_[index].get());
+  for (const auto& track : tracks_) {
+    if (track->config.board != &board) continue;
+    track->stepped = false;
+    for (Track::Stepper& stepper : track->steppers) {
+      stepper.entries.clear();
+      stepper.told = stepper.position = stepper.resumes_at;
+    }
+  }
 }
 
 // ---- steps on their way to the board ----
@@ -151,11 +203,19 @@ void BoardPort::put(const Step& step) {
   lane.last = lane.takes = step.time;
   lane.stepped = true;
   Board& board = *track.config.board;
+  track.is_lost = track.is_lost || !isUsable(board);
+  if (track.is_lost) {
+    track.open.push_back({0, step.direction, step.still});
+    due_ = clock_.now();
+    return;
+  }
   BoardClock& board_clock = board.boardClock();
   const bool is_first = track.open.empty();
   if (is_first && std::all_of(tracks_.begin(), tracks_.end(),
                               [](const auto& other) { return other->open.empty(); })) {
-    for (Board* each : boards_) each->boardClock().settle();
+    for (Board* each : boards_) {
+      if (isUsable(*each)) each->boardClock().settle();
+    }
   }
   std::int64_t tick = board_clock.tickAt(step.time);
   const Nanoseconds now = clock_.now();
@@ -217,8 +277,9 @@ bool BoardPort::flushMotor(Track& track, std::size_t motor, Nanoseconds now) {
       ++count;
     }
     if (!track.armed || track.armed_for != direction) {
-      // A time that is over would be a fault of the firmware.
-      arm(track, direction, std::max(soonest, stepper.is_reset ? stepper.last : 0));
+      // A time that is over would be a fault of the firmware, and the line may have to repeat it.
+      const std::int64_t shortly_before = *ticks - board.ticksOf(kMillisecond);
+      arm(track, direction, std::max(soonest, stepper.is_reset ? stepper.last : shortly_before));
     }
     if (!stepper.is_reset) {
       stepper.is_reset = true;
@@ -307,7 +368,7 @@ void BoardPort::stop(std::size_t channel, Nanoseconds now) {
     stepper.directions.clear();
     stepper.first = 0;
   }
-  if (board.failure() != 0) return;
+  if (!works(board)) return;
   // If the motors were never told to step, their positions are known all the same.
   board.send(Command::kTrsyncTrigger, {track.config.trsync, kTakenBack});
   askPositions(track, now);
@@ -315,6 +376,8 @@ void BoardPort::stop(std::size_t channel, Nanoseconds now) {
 }
 
 void BoardPort::askPositions(Track& track, Nanoseconds now) {
+  // Its own time, shortly before it says where the motors stand.
+  track.config.board->send(Command::kGetUptime, {});
   for (std::size_t i = 0; i < track.steppers.size(); ++i) {
     track.steppers[i].is_new = false;
     track.config.board->send(Command::kStepperGetPosition, {track.config.motors[i].oid});
@@ -324,6 +387,10 @@ void BoardPort::askPositions(Track& track, Nanoseconds now) {
 }
 
 void BoardPort::heard(Board& board, const Heard& heard, Nanoseconds now) {
+  if (heard.answer == Answer::kUptime) {
+    said_[indexOf(board)] = board.boardClock().widened(heard.arguments[1], now);
+    return;
+  }
   const std::uint32_t oid = heard.arguments[0];
   for (std::size_t channel = 0; channel < tracks_.size(); ++channel) {
     Track& track = *tracks_[channel];
@@ -367,43 +434,52 @@ void BoardPort::heard(Board& board, const Heard& heard, Nanoseconds now) {
   hears_(board, heard, now);
 }
 
-// How many of the open steps a motor has made, as far as it can have until a tick.
-std::size_t BoardPort::playedBy(const Track& track, std::size_t motor, std::int64_t until,
+// How many of the open steps a motor has made by what it has said. A motor that goes back and forth
+// is at a place several times: the earliest time counts that isn't before `least`, so that what is
+// played later still fits. Only a motor that its board has stopped was there before.
+std::size_t BoardPort::playedBy(const Track& track, std::size_t motor, const Window& window,
                                 bool& fits) const {
   const Track::Stepper& stepper = track.steppers[motor];
   const int sign = track.config.motors[motor].forward_level ? 1 : -1;
   std::int64_t position = stepper.told;
-  fits = position == stepper.position;
   std::size_t played = 0;
-  for (std::size_t i = 0; i < track.open.size(); ++i) {
+  fits = false;
+  for (std::size_t i = 0;; ++i) {
+    const bool is_last = i == track.open.size();
+    if (position == stepper.position) {
+      fits = true;
+      played = i;
+      if (is_last || track.open[i].tick > window.least) return played;
+    }
+    if (is_last || track.open[i].tick > window.most) return played;
     const Open& step = track.open[i];
-    if (step.tick > until) break;
-    const bool takes_part = (step.still & pulse::motorBit(motor)) == 0;
-    if (takes_part) position += std::int64_t{sign} * step.direction;
-    // Back and forth, several places fit: the count is the same.
-    if (position != stepper.position) continue;
-    if (!takes_part && played != i) continue;
-    fits = true;
-    played = i + 1;
+    if ((step.still & pulse::motorBit(motor)) == 0) position += std::int64_t{sign} * step.direction;
   }
-  return played;
 }
 
 // No step after this can have been played by now: only a motor that goes back and forth needs that.
 std::int64_t BoardPort::latestTick(const Track& track, Nanoseconds now) const {
-  const BoardClock& board_clock = track.config.board->boardClock();
   constexpr int kDeviations = 3;
-  return board_clock.estimateAt(now + kMillisecond + kDeviations * board_clock.uncertaintyAt(now));
+  const BoardClock& board_clock = track.config.board->boardClock();
+  const std::int64_t tick =
+      board_clock.estimateAt(now + kMillisecond + kDeviations * board_clock.uncertaintyAt(now));
+  return std::max(tick, said_[indexOf(*track.config.board)]);
+}
+
+// Each step until this has been played when the board said where its motors stand, unless it had
+// stopped them.
+std::int64_t BoardPort::earliestTick(const Track& track) const {
+  const Board& board = *track.config.board;
+  return said_[indexOf(board)] - board.ticksOf(kMillisecond);
 }
 
 void BoardPort::tellPlayed(std::size_t channel, Nanoseconds now) {
   Track& track = *tracks_[channel];
-  const BoardClock& board_clock = track.config.board->boardClock();
-  const std::int64_t until = latestTick(track, now);
+  const Window window{earliestTick(track), latestTick(track, now)};
   std::size_t played = track.open.size();
   for (std::size_t i = 0; i < track.steppers.size(); ++i) {
     bool fits = false;
-    played = std::min(played, playedBy(track, i, until, fits));
+    played = std::min(played, playedBy(track, i, window, fits));
     if (!fits) return failChannel(channel, EPROTO, now);
   }
   if (played != 0) {
@@ -413,9 +489,12 @@ void BoardPort::tellPlayed(std::size_t channel, Nanoseconds now) {
   }
   // Steps were due long before it was asked, and it hasn't made them: its board has stopped it, and
   // nobody has heard that.
+  const Board& board = *track.config.board;
   const bool is_due = !track.open.empty() &&
-                      track.open.front().tick < board_clock.estimateAt(track.asked - kStalled);
-  if (is_due && now - track.moved > kStalled) stop(channel, now);
+                      track.open.front().tick < said_[indexOf(board)] - board.ticksOf(kStalled);
+  if (!is_due || now - track.moved <= kStalled) return;
+  track.has_stalled = true;
+  stop(channel, now);
 }
 
 void BoardPort::close(std::size_t channel, std::size_t played, Nanoseconds now) {
@@ -442,12 +521,15 @@ void BoardPort::close(std::size_t channel, std::size_t played, Nanoseconds now) 
 // The motors have stopped, and have said where.
 void BoardPort::settle(std::size_t channel, Nanoseconds now) {
   Track& track = *tracks_[channel];
-  const std::int64_t until = latestTick(track, now);
+  const std::int64_t latest = latestTick(track, now);
+  // A switch may have stopped it at any time.
+  const bool by_switch = track.stopped_by != kTakenBack;
+  const Window window{by_switch ? latest : earliestTick(track), latest};
   std::vector<std::size_t> played(track.steppers.size());
   bool all_fit = true;
   for (std::size_t i = 0; i < track.steppers.size(); ++i) {
     bool fits = false;
-    played[i] = playedBy(track, i, until, fits);
+    played[i] = playedBy(track, i, window, fits);
     all_fit = all_fit && fits;
   }
   if (!all_fit) {
@@ -473,9 +555,10 @@ void BoardPort::settle(std::size_t channel, Nanoseconds now) {
   disarm(track);
   const std::size_t given_back = track.open.size();
   const bool fails = track.fails;
+  const bool has_stalled = track.has_stalled;
   const std::uint32_t stopped_by = track.stopped_by;
   track.open.clear();
-  track.armed = track.sent = track.stopping = track.has_stopped = false;
+  track.armed = track.sent = track.stopping = track.has_stopped = track.has_stalled = false;
   track.fails = track.awaits = false;
   track.stopped_by = kTakenBack;
   if (given_back != 0) listener_->givenBack(channel, given_back);
@@ -486,21 +569,22 @@ void BoardPort::settle(std::size_t channel, Nanoseconds now) {
              stopped_by - kFirstSwitch < track.config.switches.size()) {
     const Switch& by = track.config.switches[stopped_by - kFirstSwitch];
     listener_->stopped(channel, {by.reason, channel, by.motor, {}, track.still});
-  } else if (stopped_by != kTakenBack) {
+  } else if (stopped_by != kTakenBack || has_stalled) {
     listener_->failed(channel, {EPROTO, track.config.line}, now);
   }
 }
 
-// The count isn't known: what is open may have been played or not.
+// Its board works, and its motors are stopped: they can say where they stand.
 void BoardPort::failChannel(std::size_t channel, int error, Nanoseconds now) {
   Track& track = *tracks_[channel];
-  const bool is_lost = track.config.board->failure() != 0;
-  if (!is_lost) {
-    track.fails = true;
-    track.error_number = error;
-    if (!track.stopping) stop(channel, now);
-    return;
-  }
+  track.fails = true;
+  track.error_number = error;
+  if (!track.stopping) stop(channel, now);
+}
+
+// The count isn't known: what is open may have been played or not.
+void BoardPort::giveUp(std::size_t channel, int error, Nanoseconds now) {
+  Track& track = *tracks_[channel];
   const std::size_t open = track.open.size();
   track.open.clear();
   for (Track::Stepper& stepper : track.steppers) {
@@ -509,8 +593,10 @@ void BoardPort::failChannel(std::size_t channel, int error, Nanoseconds now) {
     stepper.first = 0;
     stepper.is_reset = false;
   }
-  track.armed = track.sent = track.stopping = track.has_stopped = false;
-  track.fails = track.awaits = false;
+  track.disarms_other.reset();
+  track.armed_for = 0;
+  track.armed = track.sent = track.stopping = track.has_stopped = track.has_stalled = false;
+  track.fails = track.awaits = track.is_lost = false;
   if (open != 0) listener_->givenBack(channel, open);
   if (open != 0) listener_->doubtful(channel);
   listener_->failed(channel, {error, track.config.line}, now);
@@ -518,17 +604,19 @@ void BoardPort::failChannel(std::size_t channel, int error, Nanoseconds now) {
 
 void BoardPort::lost(Board& board, Nanoseconds now) {
   for (std::size_t channel = 0; channel < tracks_.size(); ++channel) {
-    if (tracks_[channel]->config.board == &board) failChannel(channel, board.failure(), now);
+    if (tracks_[channel]->config.board == &board) giveUp(channel, board.failure(), now);
   }
 }
 
 void BoardPort::serve(Nanoseconds now) {
+  for (Board* board : boards_) isUsable(*board);
   if (writes_) writes_();
   for (std::size_t channel = 0; channel < tracks_.size(); ++channel) {
     Track& track = *tracks_[channel];
     if (track.config.board == nullptr) continue;
-    if (track.config.board->failure() != 0) {
-      if (!track.open.empty()) failChannel(channel, track.config.board->failure(), now);
+    if (track.is_lost || !works(*track.config.board)) {
+      const int error = track.config.board->failure();
+      if (!track.open.empty()) giveUp(channel, error != 0 ? error : ENODEV, now);
       continue;
     }
     flush(channel, now);
@@ -550,15 +638,20 @@ void BoardPort::serve(Nanoseconds now) {
     }
   }
   if (now >= positions_due_) positions_due_ = now + kPositions;
-  for (Board* board : boards_) board->serve(now);
+  for (Board* board : boards_) {
+    if (works(*board)) board->serve(now);
+    board->release();
+  }
   schedule(now);
 }
 
 void BoardPort::schedule(Nanoseconds now) {
   due_ = pulse::kNever;
-  for (const Board* board : boards_) due_ = std::min(due_, board->due(now));
+  for (const Board* board : boards_) {
+    if (works(*board)) due_ = std::min(due_, board->due(now));
+  }
   for (const auto& track : tracks_) {
-    if (track->open.empty() || track->config.board->failure() != 0) continue;
+    if (track->open.empty() || !works(*track->config.board)) continue;
     due_ = std::min(
         {due_, positions_due_, track->stopping ? track->asked + kAsksAgain : pulse::kNever});
     if (track->stopping) continue;

@@ -76,6 +76,11 @@ class BoardPort final : public pulse::StepPort {
   void serve(Nanoseconds now) override;
   void recordTo(pulse::PinRing& /*ring*/) override {}
 
+  /// For the thread that brings a board back: stops what its motors still make, disarms its
+  /// switches, and asks where the motors stand. @pre Board::reopen() has succeeded.
+  /// @throw BoardError
+  void prepare(Board& board);
+
  private:
   struct Track;
   class Ear;
@@ -84,6 +89,15 @@ class BoardPort final : public pulse::StepPort {
     std::int64_t tick = 0;
     int direction = 0;
     pulse::MotorSet still = 0;
+  };
+
+  bool isUsable(Board& board);
+  bool works(const Board& board) const;
+  void takeOver(Board& board);
+  /// Between these ticks a board has said where a motor stands.
+  struct Window {
+    std::int64_t least = 0;
+    std::int64_t most = 0;
   };
 
   void heard(Board& board, const Heard& heard, Nanoseconds now);
@@ -98,14 +112,18 @@ class BoardPort final : public pulse::StepPort {
   void disarm(Track& track);
   void stop(std::size_t channel, Nanoseconds now);
   void askPositions(Track& track, Nanoseconds now);
-  std::size_t playedBy(const Track& track, std::size_t motor, std::int64_t until, bool& fits) const;
+  std::size_t playedBy(const Track& track, std::size_t motor, const Window& window,
+                       bool& fits) const;
   std::int64_t latestTick(const Track& track, Nanoseconds now) const;
+  std::int64_t earliestTick(const Track& track) const;
   void tellPlayed(std::size_t channel, Nanoseconds now);
   void settle(std::size_t channel, Nanoseconds now);
   void close(std::size_t channel, std::size_t played, Nanoseconds now);
   void failChannel(std::size_t channel, int error, Nanoseconds now);
+  void giveUp(std::size_t channel, int error, Nanoseconds now);
   void schedule(Nanoseconds now);
-  std::size_t& entriesOf(const Board& board);
+  std::size_t indexOf(const Board& board) const;
+  std::size_t& entriesOf(const Board& board) { return entries_[indexOf(board)]; }
 
   const std::vector<Board*> boards_;
   pulse::Clock& clock_;
@@ -114,7 +132,10 @@ class BoardPort final : public pulse::StepPort {
   const std::function<void(const Board&, const Heard&, Nanoseconds)> hears_;
   std::vector<std::unique_ptr<Track>> tracks_;
   std::vector<std::unique_ptr<Ear>> ears_;
-  std::vector<std::size_t> entries_;  // of each board that are in use
+  std::vector<std::size_t> entries_;    // of each board that are in use
+  std::vector<std::int64_t> said_;      // the tick that each has last told
+  std::vector<std::uint64_t> resumed_;  // Board::resumed() of each when it was taken over
+  std::vector<char> usable_;            // what isUsable() has said of each
   Nanoseconds positions_due_ = 0;
 };
 
