@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "count_rounding.h"
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "path_timing/jerk_limited.h"
@@ -74,11 +75,6 @@ void requireRange(const Path& path, const std::vector<PathAxis>& axes,
       axes[k].refuseBeyondLimits(high, text);
     }
   }
-}
-
-// [microsteps] By how much a calculation in doubles may change a position.
-double roundingOf(double count) {
-  return 4.0 * std::numeric_limits<double>::epsilon() * std::abs(count);
 }
 
 // [s] The time that an axis needs to move by a part of a microstep from rest to rest: on a quintic,

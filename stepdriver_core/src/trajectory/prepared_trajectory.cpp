@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "count_rounding.h"
 #include "give_way.h"
 #include "interpolation.h"
 #include "line_path.h"
@@ -282,7 +283,7 @@ std::vector<Waypoint> PreparedTrajectory::waypointsOf(std::size_t member,
     waypoint.time_ns = nanoseconds(source.slowdown * point.time);
     const double position = read(point.positions, "positions");
     axis.refuseBeyondLimits(position, [&] { return pointText(i) + " at"; });
-    waypoint.position = axis.countOf(position);
+    waypoint.position = withoutRounding(axis.countOf(position));
     if (!point.velocities.empty()) {
       waypoint.velocity =
           read(point.velocities, "velocities") * axis.steps_per_unit / source.slowdown;

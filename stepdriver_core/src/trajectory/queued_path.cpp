@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "backlash.h"
+#include "count_rounding.h"
 #include "nanoseconds.h"
 #include "path_plan.h"
 #include "path_timing/jerk_limited.h"
@@ -377,7 +378,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(
       if (time_ns == 0) continue;  // it is the start
       Waypoint& waypoint = waypoints.emplace_back();
       waypoint.time_ns = time_ns;
-      waypoint.position = axis.countOf(point.positions[k]);
+      waypoint.position = withoutRounding(axis.countOf(point.positions[k]));
       waypoint.velocity = point.velocities[k] * axis.steps_per_unit;
       if (smooth) waypoint.acceleration = point.accelerations[k] * axis.steps_per_unit;
     }

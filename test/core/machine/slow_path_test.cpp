@@ -243,6 +243,39 @@ TEST(SlowPath, IsNotLeftBecauseAnAxisThatHardlyMovesIsFarAway) {
   EXPECT_LE(path.steps(0).size(), 142U) << "it turns once, after a step";
 }
 
+// z moves by no more than a few roundings of a double, and rests at the whole count next to them.
+// These differences took more than its acceleration in the time that x and y need for a ramp.
+TEST(SlowPath, DoesNotMoveAnAxisThatIsFarAwayByItsRounding) {
+  struct Case {
+    double scale;  // [microsteps/unit]
+    double far;    // [microsteps]
+    double speed;
+    double way;  // [microsteps] of z
+    std::vector<std::pair<double, double>> ends;
+  };
+  for (const Case& made :
+       {Case{1.0, 27'561'620.0, 0.00737, 3.8e-9, {{0.01374, -0.0024}, {-0.00148, -0.0178}}},
+        Case{1.0, 722'777'944.0, 1e6, -2.4e-7, {{-0.712, -0.364}, {43.584, -0.364}}},
+        Case{80'001.7, 999'999'999.0, 1e6, 0.0, {{0.01, 0.0}, {0.01, 0.02}}},
+        Case{0.3, 1e9 + 1.0, 1e6, 0.0, {{0.1, 0.0}, {400.1, 40.3}}}}) {
+    for (const double jerk : {0.0, 1e6}) {
+      SCOPED_TRACE(testing::Message() << made.far << ", jerk " << jerk);
+      const std::vector<motion::PathAxis> axes = {
+          pathAxis("x", {made.scale, 18.8, 3e11, jerk}),
+          pathAxis("y", {made.scale, made.speed, 3e5, jerk}),
+          pathAxis("z", {made.scale, 0.03 / made.scale, 0.001 / made.scale, jerk})};
+      PathRequest request{{"x", "y", "z"}, {}, false, 0.29, 0.0};
+      const double z = (made.far + made.way) / made.scale;
+      for (const auto& [x, y] : made.ends) request.segments.emplace_back().end = {x, y, z};
+      const PlannedPath path = planned(request, axes, {0.0, 0.0, made.far});
+      const auto& [x, y] = made.ends.back();
+      EXPECT_EQ(path.endCount(0), std::llround(x * made.scale));
+      EXPECT_EQ(path.endCount(1), std::llround(y * made.scale));
+      EXPECT_TRUE(path.steps(2).empty());
+    }
+  }
+}
+
 // Knots are so close to each other that the motion has to run ahead between two of them: the speed
 // along the path counts there, too.
 TEST(SlowPath, KeepsItsSpeedBetweenKnotsThatAreAsCloseAsTheyMayBe) {
