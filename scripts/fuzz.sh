@@ -23,6 +23,7 @@ give it as the argument of the target's program. With --build it only builds.
 
 With --repeatable, as in scripts/test.sh --fuzz, each computer plays the same inputs: as many for each target as
 test/fuzz/repeatable.txt says, from seed 1, without those that earlier runs have found, and regardless of time.
+A short run of each target is played twice then, and must be the same both times.
 
 Exit code 0: nothing was found.
 END
@@ -76,13 +77,13 @@ sanitizer_options=(ASAN_OPTIONS=quarantine_size_mb=16:detect_stack_use_after_ret
   UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS=suppressions=sources/../sanitizers/leaks.supp:print_suppressions=0)
 common_options=(-rss_limit_mb=1024 -print_final_stats=1)
 
+# fuzz_cpp NAME RUNS: RUNS counts only if the inputs are repeatable.
 fuzz_cpp() {
-  local name=$1 runs
+  local name=$1 runs=$2
   cd "$build/fuzz" || return
   [[ ! -f sources/$name.dict ]] || common_options+=("-dict=sources/$name.dict")
   common_options+=("-seed=$seed" "-artifact_prefix=found/$name-")
   if [[ -n $repeatable ]]; then
-    runs=$(runs_of "$name") || return
     # libFuzzer also looks at the depth of the stack, which depends on its address: on the environment, on the
     # paths and on the kernel's randomization. Nothing may depend on the time either, or on the order of a
     # folder's files. What is found stays in memory.
@@ -95,22 +96,37 @@ fuzz_cpp() {
   fi
 }
 fuzz_python() {
-  local options=(--seconds "$seconds" --kept "$build/fuzz/$1" "$build/fuzz/$1") runs
-  if [[ -n $repeatable ]]; then
-    runs=$(runs_of "$1") || return
-    options=(--runs "$runs")
-  fi
+  local options=(--seconds "$seconds" --kept "$build/fuzz/$1" "$build/fuzz/$1")
+  [[ -z $repeatable ]] || options=(--runs "$2")
   PYTHONHASHSEED=0 /usr/bin/python3 -B "$src/test/fuzz/readers_fuzz.py" "$1" --seed "$seed" \
     --found "$build/fuzz/found/$1-" "${options[@]}" "$src/test/fuzz/corpus/$1"
 }
 
+# course_of LOG: which inputs a run has played, and what they have reached: nothing of time and memory.
+course_of() { sed -n '/^#[0-9]/{s/ exec\/s: .* rss: [^ ]*//;p}' "$1"; }
+
+# repeats LANGUAGE NAME: whether a short run is the same when it is played again.
+repeats() {
+  local part=$build/log/fuzz-$2-part most
+  most=$(($(runs_of "$2") / 20 + $(find "$src/test/fuzz/corpus/$2" -type f | wc -l)))
+  ("fuzz_$1" "$2" "$most" >"$part-1.log" 2>&1) || true
+  ("fuzz_$1" "$2" "$most" >"$part-2.log" 2>&1) || true
+  grep -q '^#[0-9]' "$part-1.log" && diff <(course_of "$part-1.log") <(course_of "$part-2.log") >"$part.diff"
+}
+
 # run_target NAME: writes a line for the summary.
 run_target() {
-  local name=$1 log=$build/log/fuzz-$1.log status=0 language=python verdict="nothing found"
+  local name=$1 log=$build/log/fuzz-$1.log status=0 language=python verdict="nothing found" runs=0
   mkdir -p "$build/fuzz/$name"
+  rm -f "$build/log/fuzz-$name-part.diff"
   [[ ! -f $src/test/fuzz/${name}_fuzz.cpp ]] || language=cpp
-  "fuzz_$language" "$name" >"$log" 2>&1 || status=$?
+  [[ -z $repeatable ]] || runs=$(runs_of "$name") || return
+  ("fuzz_$language" "$name" "$runs" >"$log" 2>&1) || status=$?
   ((status == 0)) || verdict="FAILED, see $log"
+  if [[ -n $repeatable ]] && ((status == 0)) && ! repeats "$language" "$name"; then
+    status=1
+    verdict="FAILED, a second run differs: see $build/log/fuzz-$name-part.diff"
+  fi
   printf '%-18s %8s inputs, %6s places in the code reached: %s\n' "$name" \
     "$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")" \
     "$(sed -n 's/.* cov: \([0-9]*\).*/\1/p' "$log" | tail -n 1)" "$verdict"
@@ -118,8 +134,9 @@ run_target() {
 }
 
 show_failure() {
-  local log=$build/log/fuzz-$1.log
+  local log=$build/log/fuzz-$1.log differences=$build/log/fuzz-$1-part.diff
   say "" "==== $1"
+  if [[ -s $differences ]]; then head -n 10 "$differences" && return; fi
   grep -m 1 -A 40 -E '^broken promise|^==[0-9]+==|runtime error|^ALARM' "$log" || tail -n 40 "$log"
   grep 'Test unit written' "$log" || true
 }

@@ -183,6 +183,7 @@ class Fuzzer:
         self.lines = Lines()
         self.inputs = []
         self.tried = 0
+        self.all_inputs = hashlib.sha1()
 
     def fails(self, data):
         """Tries an input, and keeps it if it reaches a new line. Returns whether it fails."""
@@ -191,6 +192,7 @@ class Fuzzer:
         path.write_bytes(data)
         why = why_failed(self.options.target, path, self.lines)
         self.tried += 1
+        self.all_inputs.update(data)
         if why:
             found = f"{self.options.found}{hashlib.sha1(data).hexdigest()}"
             pathlib.Path(found).write_bytes(data)
@@ -233,7 +235,7 @@ def main(words):
     with tempfile.TemporaryDirectory() as folder:
         fuzzer = Fuzzer(options, pathlib.Path(folder))
         failed = fuzzer.run()
-    print(f"#{fuzzer.tried} DONE cov: {len(fuzzer.lines.reached)}\n"
+    print(f"#{fuzzer.tried} DONE cov: {len(fuzzer.lines.reached)} inputs: {fuzzer.all_inputs.hexdigest()}\n"
           f"stat::number_of_executed_units: {fuzzer.tried}")
     return 1 if failed else 0
 
