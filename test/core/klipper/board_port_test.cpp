@@ -60,7 +60,8 @@ class FaultyLink : public Link {
   double share = 0.0;  // of bytes with a fault
   Nanoseconds latency = 0;
   std::uint64_t faults = 0;
-  int error = 0;  // of all calls from now on
+  int error = 0;         // of all calls from now on
+  bool is_deaf = false;  // what the board says is lost
 
  private:
   using Bytes = std::deque<std::pair<Nanoseconds, std::uint8_t>>;
@@ -73,6 +74,7 @@ class FaultyLink : public Link {
     }
     board_.play(clock_.now());
     const std::vector<std::uint8_t> said = board_.take();
+    if (is_deaf) return;
     spoil(said.data(), said.size(), from_board_);
   }
 
@@ -93,13 +95,18 @@ class FaultyLink : public Link {
           add(bytes[i], out);
           break;
         case 4:
-          delayed_ = clock_.now() + static_cast<Nanoseconds>(random_() % 200) * kMillisecond / 20;
+          delayed_ = clock_.now() + delay();
           add(bytes[i], out);
           break;
         default:
           add(static_cast<std::uint8_t>(bytes[i] ^ (1U << (random_() % 8))), out);
       }
     }
+  }
+  // Mostly up to 10 ms, and rarely up to 200 ms.
+  Nanoseconds delay() {
+    const auto part = static_cast<Nanoseconds>(random_() % 200);
+    return random_() % 50 == 0 ? part * kMillisecond : part * kMillisecond / 20;
   }
   void add(std::uint8_t byte, Bytes& out) {
     Nanoseconds time = std::max(clock_.now() + latency, delayed_);
@@ -405,6 +412,32 @@ TEST_F(BoardPortTest, FailsIfTheBoardRunsOutOfSteps) {
   EXPECT_FALSE(heard().doubtful) << "the board has said where it stands";
   EXPECT_FALSE(on->board.isShutdown()) << on->board.reason();
   expectAllAccounted();
+}
+
+// A motor that goes back and forth is at a place more than once: what it says after a while without
+// an answer must not be taken for an earlier time.
+TEST_F(BoardPortTest, CountsAMotorThatGoesBackAndForthWhileAnswersAreLost) {
+  for (int turn = 60; turn < 140; ++turn) {
+    SCOPED_TRACE(testing::Message() << "turns after " << turn << " steps");
+    put_.clear();
+    lines.edges.clear();
+    make({config(0)});
+    constexpr int kSteps = 600;
+    constexpr Nanoseconds kInterval = kMillisecond / 4;
+    const Nanoseconds start = clock.now() + kStart;
+    for (int i = 0; i < kSteps; ++i) {
+      const Nanoseconds time = start + i * kInterval;
+      put(0, i / turn % 2 == 0 ? 1 : -1, time);
+      // Its answers are lost in each second of these times.
+      link->is_deaf = i / 160 % 2 == 1;
+    }
+    link->is_deaf = false;
+    finish();
+    ASSERT_EQ(heard().failure.error, 0);
+    ASSERT_FALSE(heard().doubtful);
+    ASSERT_EQ(heard().played, static_cast<std::size_t>(kSteps));
+    expectAllAccounted();
+  }
 }
 
 // 100,000 faults of the line: no step is played that wasn't put, none twice, and none at another
