@@ -184,6 +184,19 @@ TEST_F(BaseTest, DrivesNowhereByALatchedCommandThatComesAgainWithANewConnection)
   EXPECT_TRUE(waitUntil([&] { return node.pulses() > pulses; })) << "a newer one";
 }
 
+TEST_F(BaseTest, DrivesNowhereByACommandThatWasLatchedBeforeItsStart) {
+  node.start();
+  publisher = ros::NodeHandle().advertise<geometry_msgs::Twist>(node.beside("cmd_vel"), 1, true);
+  publish(0.3, 0.0);
+  launch();
+  EXPECT_TRUE(waitUntil([this] { return says(", which latches") || node.pulses() > 0; }));
+  EXPECT_EQ(timesSaid(node.beside("cmd_vel") + ": a message of"), 1U) << base->output();
+  ASSERT_TRUE(waitUntil([this] { return says("Ready"); }));
+  EXPECT_EQ(node.pulses(), 0);
+  publish(0.3, 0.0);
+  EXPECT_TRUE(waitUntil([this] { return node.pulses() > 0; })) << "a newer one";
+}
+
 TEST_F(BaseTest, DrivesASquareWhosePoseIsThatOfTheCounts) {
   node.set("simulation/speed", 10.0);
   start();

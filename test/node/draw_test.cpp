@@ -8,7 +8,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <iomanip>
 #include <map>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -118,6 +120,26 @@ TEST_F(Draw, GoesThroughDots) {
   expectSays(picture.text(), "dots of the drawing");
   const auto report = node.rig();
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{1600, 2400}));
+}
+
+// Its last corner, by sine and cosine, is 1e-15 mm off its first: a line without a step.
+TEST_F(Draw, ReachesTheEndOfAClosedShape) {
+  node.traced();
+  node.start();
+  std::ostringstream octagon;
+  octagon << std::setprecision(17);
+  for (int corner = 0; corner <= 8; ++corner) {
+    const double angle = corner * kPi / 4.0;
+    octagon << 20.0 + 10.0 * std::cos(angle) << " " << 10.0 * std::sin(angle) << "\n";
+  }
+  write("0 0\n" + octagon.str());
+  const auto end = draw({"--tolerance", "0.05"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  expectSays(end.output, "100 %");
+  const auto report = node.rig();
+  EXPECT_EQ(report.pulses_forward[0] - report.pulses_backward[0], 2400) << "x at 30 mm";
+  EXPECT_EQ(report.pulses_forward[1] - report.pulses_backward[1], 0) << "y at 0";
+  EXPECT_GE(report.pulses_forward[1], 790) << "of 10 mm, less what the corner was rounded by";
 }
 
 class DrawWithATool : public Draw {
