@@ -267,9 +267,10 @@ std::vector<Parameter> parametersOf(const Node& node) {
   if (std::string(node.name) == "uart_chip") return parametersUnder("A chip on a UART", "axes/x/");
   if (std::string(node.name) == "spi_chip") {
     std::vector<Parameter> all = parametersUnder("A chip on SPI", "axes/x/");
+    std::set<std::string> others{"axes/x/tmc/port", "axes/x/tmc/baud", "axes/x/tmc/address"};
+    for (const Parameter& parameter : all) others.insert(parameter.key);
     for (const Parameter& parameter : parametersUnder("A chip on a UART", "axes/x/")) {
-      const std::string key = split(parameter.key, '/').back();
-      if (key != "port" && key != "baud" && key != "address") all.push_back(parameter);
+      if (others.count(parameter.key) == 0) all.push_back(parameter);
     }
     return all;
   }

@@ -151,7 +151,7 @@ void HomingToStall::watch() {
 // Without DIAG the load is read. The engine ends the motion as at DIAG.
 void HomingToStall::noteLoad(std::uint32_t load) {
   look_at_ = context().now + kLoadEvery;
-  if (load > 2U * static_cast<std::uint32_t>(stall_.threshold)) return;
+  if (!chip_.isStall(load)) return;
   pulse::Command command;
   command.kind = pulse::Command::Kind::kBlocked;
   command.channel = axis_.motor.channel();

@@ -195,7 +195,9 @@ void SetUpChipsStep::take(const Open& open, const bus::RegisterDone& done) {
   const std::string why = open.asks ? chip.takePoll(done) : chip.takeSetUp(done);
   axis_.motor.noteChips();
   if (open.asks) {
-    if (!why.empty()) post({open.motor, false});
+    if (why.empty()) return;
+    axis_.distrust();
+    post({open.motor, false});
   } else if (why.empty()) {
     axis_.motor.alignTranslator(open.motor);
   } else if (fault_.empty()) {

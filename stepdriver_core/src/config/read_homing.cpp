@@ -213,6 +213,7 @@ class HomingReader {
                          lowerBoundText(kSlowestStall / fullSteps()), numberText(kSlowestStall)));
     }
     const double above = config_.tmc->spread_cycle_above;
+    if (config_.tmc->baud == 0) return;  // on SPI: it chops as in SpreadCycle then
     if (above > 0.0 && rate >= above) {
       mustBe(key, fmt::format("below tmc/spreadcycle_above, which is {}: the chip detects stalls "
                               "below it only",

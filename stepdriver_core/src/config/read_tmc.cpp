@@ -21,7 +21,6 @@ const std::vector<std::string> kEdges = {"one", "both"};
 // The chip measures the rate of each frame with its clock, up to 500 kbaud.
 const std::vector<int> kBauds = {9600, 19200, 38400, 57600, 115200, 230400, 460800, 500000};
 constexpr int kMostAddress = 3;
-constexpr int kMostThreshold = 255;  // of SGTHRS
 // Boards have 50 to 150 mOhm; motors of less than 0.2 A have more.
 constexpr Range kResistors{10.0, 1000.0};
 constexpr double kMilliohm = 1e-3;
@@ -85,7 +84,8 @@ class TmcReader {
   /// @return whether there is a threshold, and nothing is wrong.
   bool readStall(TmcConfig& config) {
     const std::size_t before = reader_.issues().size();
-    const int threshold = reader_.integer("stall_threshold", 0, kMostThreshold, 0);
+    const tmc::Thresholds range = tmc::stallThresholdsOf(tmc::modelOf(chip_.name));
+    const int threshold = reader_.integer("stall_threshold", range.least, range.most, 0);
     const int phase = reader_.integer("stall_phase", 0, tmc::kMscntPerCycle - 1, 0);
     stall_current_ = reader_.findNumber("stall_current_a", Range::positive(), Presence::kOptional);
     if (!reader_.has("stall_threshold")) {
@@ -96,13 +96,14 @@ class TmcReader {
       }
       return false;
     }
-    refuseUnlessDetected("stall_threshold", config);
+    if (!is_on_spi_) refuseUnlessDetected("stall_threshold", config);
     config.stall.emplace();
     config.stall->threshold = threshold;
     if (reader_.has("stall_phase")) config.stall->phase = phase;
     return reader_.issues().size() == before;
   }
 
+  /// In StealthChop, by StallGuard4.
   void refuseUnlessDetected(const char* key, const TmcConfig& config) {
     if (tmc::modelOf(chip_.name) != tmc::Model::kTmc2209) {
       reader_.contradiction(
@@ -118,7 +119,8 @@ class TmcReader {
   /// Its speed is read by readTmcSpeeds().
   void readStallFault(TmcConfig& config) {
     constexpr const char* kThreshold = "stall_fault_threshold";
-    const int threshold = reader_.integer(kThreshold, 0, kMostThreshold, 0);
+    const tmc::Thresholds range = tmc::stallThresholdsOf(tmc::Model::kTmc2209);
+    const int threshold = reader_.integer(kThreshold, range.least, range.most, 0);
     if (!reader_.has(kThreshold)) return;
     refuseUnlessDetected(kThreshold, config);
     config.stall_fault.emplace();

@@ -13,8 +13,10 @@ namespace {
 // the electrical characteristics, and the formula in section 9 of each datasheet. The table of
 // TMC2209 (rev. 1.03, section 8: 100 mOhm 1.92 A, 120 mOhm 1.64 A, 150 mOhm 1.35 A, 220 mOhm 0.96
 // A) is met by 0.325 V to its last digit, and so is the one of TMC5160 up to 100 mOhm (2.3 A),
-// which adds no resistance and has no vsense. For the TMC2130 the firmware Klipper computes with
-// 0.32 V and 0.18 V, TMCStepper with 0.325 V: 1.6 % apart, which is half of a step of the scale.
+// which adds no resistance and has no vsense; so compute TMCStepper (TMC2160Stepper.cpp) and
+// Klipper (tmc5160.py). For the TMC2130 Klipper (tmc2130.py) computes with 0.32 V and 0.18 V,
+// TMCStepper and grblHAL (tmc2130.c) with 0.325 V: 1.6 % apart, which is half of a step of the
+// scale.
 constexpr double kFullScale = 0.325;      // vsense 0
 constexpr double kFullScale2130 = 0.320;  // the same
 constexpr double kFineFullScale = 0.180;  // vsense 1
@@ -26,7 +28,8 @@ constexpr int kScales = 32;
 constexpr double kRounding = 1e-9;
 
 constexpr double kClock = 12e6;  // [Hz]
-// TMC2130, electrical characteristics: 13.2 MHz at 50 degrees C, as Klipper computes, too.
+// TMC2130, electrical characteristics: 13.2 MHz at 50 degrees C, as in Klipper (tmc2130.py) and
+// grblHAL (tmc2130.h), too.
 constexpr double kClock2130 = 13.2e6;
 
 // Section 5.2: TSTEP counts clocks in 20 bits, and the thresholds are compared with it.
@@ -56,6 +59,9 @@ constexpr std::uint32_t kGconfStealthChopOnSpi = 1U << 2U;
 // DIAG0 pulls low at over-temperature and shorts.
 constexpr std::uint32_t kGconfErrorsOnDiag0 = 1U << 5U;
 constexpr std::uint32_t kStallGuardOnSpi = 0x3FF;  // of DRV_STATUS
+// SGT, a signed number of 7 bits in COOLCONF.
+constexpr std::uint32_t kSgt = 0x7F;
+constexpr unsigned kSgtShift = 16;
 constexpr int kSpiWarningCelsius = 120;
 constexpr unsigned kPresentScaleShift = 16;
 constexpr std::uint32_t kPresentScale = 0x1FU << kPresentScaleShift;
@@ -254,6 +260,24 @@ std::uint32_t gconfOf(const Settings& settings) {
   }
   return kGconfUartPin | kGconfMicrostepsByMres | kGconfFilter |
          (settings.spread_cycle ? kGconfSpreadCycle : 0);
+}
+
+Thresholds stallThresholdsOf(Model model) {
+  return isOnSpi(model) ? Thresholds{-64, 63} : Thresholds{0, 255};
+}
+
+std::uint32_t coolconfOf(int threshold) {
+  return (static_cast<std::uint32_t>(threshold) & kSgt) << kSgtShift;
+}
+
+std::uint32_t gconfForStallOnSpi() {
+  return kGconfErrorsOnDiag0 | kGconfStallOnDiag0OnSpi | kGconfStallOnDiag1OnSpi;
+}
+
+// SGT moves SG_RESULT itself, which is 0 at a stall.
+bool isStall(Model model, std::uint32_t load, int threshold) {
+  if (isOnSpi(model)) return (load & kStallGuardOnSpi) == 0;
+  return load <= 2U * static_cast<std::uint32_t>(threshold);
 }
 
 std::vector<RegisterValue> setUpOnSpi(const Settings& settings, int microsteps) {

@@ -60,6 +60,8 @@ constexpr std::uint32_t kGconfSpreadCycle = 1U << 2U;
 constexpr std::uint32_t kGconfUartPin = 1U << 6U;  ///< PDN_UART doesn't power down
 constexpr std::uint32_t kGconfMicrostepsByMres = 1U << 7U;
 constexpr std::uint32_t kGconfFilter = 1U << 8U;
+constexpr std::uint32_t kGconfStallOnDiag0OnSpi = 1U << 7U;
+constexpr std::uint32_t kGconfStallOnDiag1OnSpi = 1U << 8U;
 
 constexpr std::uint32_t kGstatReset = 1U << 0U;
 constexpr std::uint32_t kGstatDriverError = 1U << 1U;
@@ -163,6 +165,30 @@ std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on);
 
 /// GCONF: VREF doesn't scale the current.
 std::uint32_t gconfOf(const Settings& settings);
+
+/// @name Stalls: StallGuard4 of a TMC2209, in StealthChop only, and StallGuard2 of chips on SPI, in
+/// SpreadCycle only
+/// @{
+constexpr bool detectsStalls(Model model) { return model != Model::kTmc2208; }
+/// The thresholds of a chip.
+struct Thresholds {
+  int least = 0;
+  int most = 0;
+};
+/// SGTHRS, or SGT of a chip on SPI. @pre detectsStalls()
+Thresholds stallThresholdsOf(Model model);
+/// COOLCONF of a chip on SPI with this SGT.
+std::uint32_t coolconfOf(int threshold);
+/// GCONF of a chip on SPI while it watches for a stall: in SpreadCycle, and both of its outputs
+/// DIAG report it.
+std::uint32_t gconfForStallOnSpi();
+/// The register with SG_RESULT.
+constexpr std::uint8_t loadRegisterOf(Model model) {
+  return isOnSpi(model) ? kDrvStatus : kSgResult;
+}
+/// Whether the value of that register is a stall.
+bool isStall(Model model, std::uint32_t load, int threshold);
+/// @}
 
 /// A register and its value.
 struct RegisterValue {

@@ -430,11 +430,10 @@ void Controller::takeSample(axis::AxisModel& axis, std::size_t motor,
   if (!fault.empty() && axis.moving()) failChip(axis, motor, fault);
 }
 
-// After a change of the current that is under way: it was made without this one.
 void Controller::superviseIdleCurrent(const axis::AxisModel& axis, motor::TmcChip& chip) {
   const bool idle = axis.motor.power().isIdle() && chip.config().idle_current;
   if (idle == chip.isIdle() || chip.setting_idle != 0 || !answers(chip)) return;
-  if (chip.isPreparedForStall() || !requests_.current_changes.empty()) return;
+  if (chip.isPreparedForStall()) return;
   bus::RegisterJob job = chip.setIdle(idle);
   job.id = chip.setting_idle = context_.newJob();
   context_.out->register_jobs.push_back(std::move(job));
@@ -502,7 +501,7 @@ void Controller::takeCurrent(const RequestContext::CurrentChange& change,
   axis::AxisModel& axis = *context_.axes.at(change.axis);
   motor::TmcChip& chip = *axis.motor.tmcAt(change.motor);
   const bool was_set_up = chip.isSetUp();
-  const std::string why = chip.takeCurrent(change.scale, done);
+  const std::string why = chip.takeCurrent(done);
   axis.motor.noteChips();
   if (why.empty()) return;
   change.call->fail({activity::Failure::Kind::kGpio,
@@ -516,9 +515,9 @@ void Controller::failChip(axis::AxisModel& axis, std::size_t motor, const std::s
 
 void Controller::failAxis(axis::AxisModel& axis, const std::string& fault,
                           const std::string& remedy) {
+  axis.distrust();
   if (axis.fault) return;
   axis.fault.latch(fault, remedy);
-  axis.distrust();
   axis.noteStop();
   pulse::Command command;
   command.kind = pulse::Command::Kind::kFault;

@@ -16,7 +16,8 @@ constexpr unsigned kVersionShift = 24;
 // Without DIAG, so many samples in a row are a stall: a damaged one may be believed once.
 constexpr int kStalledSamples = 2;
 constexpr const char* kWireRemedy =
-    "check the chip's motor supply, its address and the wire to PDN_UART, then call recover";
+    "check the chip's motor supply, its address, the wire to PDN_UART and tmc/baud, then call "
+    "recover";
 constexpr const char* kSpiRemedy =
     "check the chip's supplies and the wires of its SPI, then call recover";
 constexpr const char* kPortRemedy = "then call recover";
@@ -149,7 +150,8 @@ tmc::CurrentScale TmcChip::scaleOf(double run, double hold) const {
   return {tmc::scaleBelow(run, range, board()), tmc::scaleBelow(hold, range, board()), range};
 }
 
-bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) const {
+bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) {
+  settings_.current = scale;
   return jobOf({write(tmc::kIholdIrun, tmc::currentsOf(effective(scale)))});
 }
 
@@ -162,15 +164,31 @@ bus::RegisterAccess TmcChip::write(std::uint8_t number, std::uint32_t value) con
   return {Kind::kWrite, static_cast<std::uint8_t>(config().address), number, value, 0};
 }
 
-bus::RegisterJob TmcChip::prepareStall() const {
-  const config::StallConfig& stall = *config().stall;
+tmc::CurrentScale TmcChip::stallScale() const {
   tmc::CurrentScale scale = settings_.current;
-  scale.run = tmc::scaleBelow(stall.current, scale.range, board());
+  scale.run = tmc::scaleBelow(config().stall->current, scale.range, board());
   scale.hold = std::min(scale.hold, scale.run);
-  return jobOf({write(tmc::kTcoolthrs, 0), write(tmc::kTpwmthrs, 0),
-                write(tmc::kIholdIrun, tmc::currentsOf(scale)),
-                write(tmc::kSgthrs, static_cast<std::uint32_t>(stall.threshold)),
-                read(tmc::kMscnt)});
+  return scale;
+}
+
+bus::RegisterAccess TmcChip::writeBack(std::uint8_t number, std::uint32_t value) const {
+  bus::RegisterAccess access = write(number, value);
+  access.kind = Kind::kWriteBack;
+  return access;
+}
+
+bus::RegisterJob TmcChip::prepareStall() const {
+  const int threshold = config().stall->threshold;
+  Accesses all{write(tmc::kTcoolthrs, 0), write(tmc::kIholdIrun, tmc::currentsOf(stallScale()))};
+  if (tmc::isOnSpi(settings_.model)) {
+    all.push_back(write(tmc::kCoolconfOnSpi, tmc::coolconfOf(threshold)));
+    all.push_back(writeBack(tmc::kGconf, tmc::gconfForStallOnSpi()));
+  } else {
+    all.push_back(write(tmc::kTpwmthrs, 0));
+    all.push_back(write(tmc::kSgthrs, static_cast<std::uint32_t>(threshold)));
+  }
+  all.push_back(read(tmc::kMscnt));
+  return jobOf(std::move(all));
 }
 
 // A threshold is good for speeds from 80 % on of the one that it was found at.
@@ -185,7 +203,13 @@ bus::RegisterAccess TmcChip::sample(std::uint8_t number) const {
   return access;
 }
 
-bus::RegisterJob TmcChip::readLoad() const { return jobOf({sample(tmc::kSgResult)}); }
+bus::RegisterJob TmcChip::readLoad() const {
+  return jobOf({sample(tmc::loadRegisterOf(settings_.model))});
+}
+
+bool TmcChip::isStall(std::uint32_t load) const {
+  return tmc::isStall(settings_.model, load, config().stall->threshold);
+}
 
 bus::RegisterJob TmcChip::sampleLoad() const {
   return jobOf({sample(tmc::kSgResult), sample(tmc::kTstep), sample(tmc::kDrvStatus)});
@@ -196,11 +220,16 @@ bus::RegisterJob TmcChip::disarmStall() const {
 }
 
 bus::RegisterJob TmcChip::endStall() const {
+  const std::uint32_t currents = tmc::currentsOf(effective(settings_.current));
+  if (tmc::isOnSpi(settings_.model)) {
+    return jobOf({write(tmc::kTcoolthrs, 0), writeBack(tmc::kGconf, tmc::gconfOf(settings_)),
+                  write(tmc::kCoolconfOnSpi, 0), write(tmc::kIholdIrun, currents)});
+  }
   const auto threshold = [this](double speed) { return tmc::thresholdOf(speed, settings_.model); };
   return jobOf({write(tmc::kTcoolthrs, 0),
                 write(tmc::kSgthrs, static_cast<std::uint32_t>(settings_.stall_threshold)),
                 write(tmc::kTpwmthrs, threshold(settings_.spread_cycle_above)),
-                write(tmc::kIholdIrun, tmc::currentsOf(effective(settings_.current))),
+                write(tmc::kIholdIrun, currents),
                 write(tmc::kTcoolthrs, threshold(settings_.stall_above))});
 }
 
@@ -253,6 +282,7 @@ std::string TmcChip::takeSetUp(const bus::RegisterDone& done) {
   const std::uint32_t gstat = done.values[done.values.size() - 2];
   const tmc::Status status = tmc::statusOf(settings_.model, done.values.back());
   takeStatus(status);
+  noteCurrents();
   std::string fault = faultOf(gstat, status);
   state_.is_set_up = fault.empty();
   prepared_for_stall_ = false;
@@ -312,7 +342,7 @@ bool TmcChip::isStalled(const bus::RegisterDone& done, const tmc::Status& status
   const bool is_fast =
       done.values.at(1) <= tmc::thresholdOf(settings_.stall_above, settings_.model);
   return is_fast && !status.standstill && status.stealth_chop.value_or(false) &&
-         done.values.front() <= 2U * static_cast<std::uint32_t>(settings_.stall_threshold);
+         tmc::isStall(settings_.model, done.values.front(), settings_.stall_threshold);
 }
 
 std::string TmcChip::stallFault() {
@@ -329,10 +359,9 @@ std::string TmcChip::takeIdle(const bus::RegisterDone& done) {
   return done.failure == bus::Failure::kNone ? "" : failureText(done);
 }
 
-std::string TmcChip::takeCurrent(const tmc::CurrentScale& scale, const bus::RegisterDone& done) {
+std::string TmcChip::takeCurrent(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
-  settings_.current = scale;
   noteCurrents();
   return "";
 }

@@ -41,8 +41,8 @@ class TmcChip {
   driver::tmc::CurrentScale scaleOf(double run, double hold) const;
   /// [A rms] The lowest current in that range.
   double lowestCurrent() const { return currentOf(0); }
-  /// Other currents.
-  bus::RegisterJob setCurrent(const driver::tmc::CurrentScale& scale) const;
+  /// Other currents, which all later jobs keep, too.
+  bus::RegisterJob setCurrent(const driver::tmc::CurrentScale& scale);
   /// At rest the current of the idle timeout, or again as before. @pre config().idle_current
   bus::RegisterJob setIdle(bool idle);
   /// setIdle(true) was the last one.
@@ -53,10 +53,13 @@ class TmcChip {
   /// @{
   /// The current and the threshold for it. Its value is MSCNT.
   bus::RegisterJob prepareStall() const;
-  /// From now on the chip tells of a stall at DIAG. @param speed [full steps/s] of the motor
+  /// From now on the chip tells of a stall at DIAG, if it is fast enough. @param speed [full
+  /// steps/s] of the motor
   bus::RegisterJob armStall(double speed) const;
-  /// SG_RESULT.
+  /// The register with SG_RESULT.
   bus::RegisterJob readLoad() const;
+  /// Whether the value of readLoad() is a stall.
+  bool isStall(std::uint32_t load) const;
   /// It tells of no stall any more. Its value is MSCNT.
   bus::RegisterJob disarmStall() const;
   /// The registers are as before prepareStall().
@@ -87,9 +90,8 @@ class TmcChip {
   std::string stallFault();
   /// Takes the answer to setIdle(). @return why it failed; empty if it didn't.
   std::string takeIdle(const bus::RegisterDone& done);
-  /// Takes the answer to setCurrent(), which also counts for a later setUp(). @return why the
-  ///   currents aren't changed; empty if they are.
-  std::string takeCurrent(const driver::tmc::CurrentScale& scale, const bus::RegisterDone& done);
+  /// Takes the answer to setCurrent(). @return why the currents aren't changed; empty if they are.
+  std::string takeCurrent(const bus::RegisterDone& done);
 
   /// [1/256 full step] Its place in the electrical cycle when it was set up, or audited last.
   int mscnt() const { return mscnt_; }
@@ -137,6 +139,7 @@ class TmcChip {
   bus::RegisterAccess write(std::uint8_t number, std::uint32_t value) const;
   bus::RegisterAccess read(std::uint8_t number, std::uint32_t volatile_bits = 0) const;
   bus::RegisterAccess sample(std::uint8_t number) const;
+  bus::RegisterAccess writeBack(std::uint8_t number, std::uint32_t value) const;
   void count(const bus::RegisterDone& done);
   std::string failureText(const bus::RegisterDone& done);
   void takeStatus(const driver::tmc::Status& status);
@@ -147,6 +150,7 @@ class TmcChip {
   /// With the hold current of the idle timeout, if that is over.
   driver::tmc::CurrentScale effective(driver::tmc::CurrentScale scale) const;
   bool isStalled(const bus::RegisterDone& done, const driver::tmc::Status& status) const;
+  driver::tmc::CurrentScale stallScale() const;
   double currentOf(int scale) const;  // [A rms]
   /// What of these flags stops the motor.
   std::string faultOf(std::uint32_t gstat, const driver::tmc::Status& status);

@@ -371,6 +371,7 @@ void RigAxis::setFaults(const RigFaults& faults, std::int64_t time_ns) {
 }
 
 void RigAxis::breakChip(std::int64_t time_ns) {
+  if (tmc_) tmc_->noteDriverError();
   const bool ends = spec_.chip.fault_end == driver::FaultEnd::kItself;
   chip_fault_ = true;
   chip_fault_ends_ns_ =
@@ -464,7 +465,6 @@ void RigAxis::meetTrouble(std::int64_t time_ns) {
   if (!tmc_ || chip_fault_ || !chip_.energized()) return;
   const TmcTrouble& trouble = tmc_->trouble();
   if (!trouble.over_temperature && !trouble.short_a && !trouble.short_b) return;
-  tmc_->noteDriverError();
   breakChip(time_ns);
 }
 

@@ -23,6 +23,7 @@ constexpr int kSgthrs = 0x40;
 constexpr int kSgResult = 0x41;
 constexpr int kMscnt = 0x6A;
 constexpr int kChopconf = 0x6C;
+constexpr int kCoolconfOnSpi = 0x6D;
 constexpr int kDrvStatus = 0x6F;
 constexpr int kPwmconf = 0x70;
 
@@ -58,7 +59,7 @@ void TmcModel::write(int number, std::uint32_t value) {
   const bool is_read_only = number == kIfcnt || number == (isOnSpi() ? kIoinOnSpi : kIoin) ||
                             number == kTstep || number == kMscnt || number == kDrvStatus;
   if (!is_read_only) registers_.at(static_cast<std::size_t>(number)) = value;
-  if (number == kIholdIrun && first_run_ == 0) first_run_ = runOf();
+  if (number == kChopconf && (value & 0xFU) != 0 && first_run_ == 0) first_run_ = runOf();
 }
 
 int TmcModel::microsteps() const {
@@ -144,15 +145,25 @@ bool TmcModel::isStealthy(std::uint32_t tstep) const {
   return is_set == isOnSpi() && tstep >= registers_[kTpwmthrs];
 }
 
+// SGT, a signed number of 7 bits. The rig's chips have SG_RESULT 8 higher with each step of it.
+int TmcModel::shiftOfLoad() const {
+  constexpr int kPerStep = 8;
+  const int sgt = static_cast<int>(registers_[kCoolconfOnSpi] >> 16U & 0x7FU);
+  return kPerStep * (sgt < 64 ? sgt : sgt - 128);
+}
+
 // SG_RESULT falls with the load, which makes the rotor lag: to 0 at the highest torque. On SPI it
-// has a bit more, and is measured in SpreadCycle only.
+// has a bit more, is shifted by SGT, and is measured in SpreadCycle only: 0 is a stall, which DIAG0
+// and DIAG1 report if GCONF says so.
 bool TmcModel::measure(double lag, std::uint32_t tstep) {
   const double load = std::min(lag / (kPi / 2.0), 1.0);
   if (isOnSpi()) {
-    if (!isStealthy(tstep)) {
-      stall_guard_ = static_cast<std::uint32_t>(std::lround(1023.0 * (1.0 - load)));
-    }
-    return false;
+    if (isStealthy(tstep)) return false;
+    constexpr double kHighest = 1023.0;
+    stall_guard_ = static_cast<std::uint32_t>(
+        std::lround(std::clamp(kHighest * (1.0 - load) + shiftOfLoad(), 0.0, kHighest)));
+    const bool reports = (registers_[kGconf] & 3U << 7U) != 0;  // diag0_stall, diag1_stall
+    return reports && tstep <= slowestStall() && stall_guard_ == 0;
   }
   if (!isStealthy(tstep)) return false;
   stall_guard_ = 2 * static_cast<std::uint32_t>(std::lround(255.0 * (1.0 - load)));

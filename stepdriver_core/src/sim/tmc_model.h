@@ -46,8 +46,8 @@ class TmcModel {
   bool outputsOn() const;
   /// [Hz] With which it counts times.
   double clock() const;
-  /// The torque, as a part of that of the first run current that was written: the motor was chosen
-  /// for that.
+  /// The torque, as a part of that of the run current with which its outputs were switched on
+  /// first: the motor was chosen for that.
   double torque() const;
   /// A full step was made. @param lag [electrical rad] of the rotor behind the field
   /// @return whether DIAG tells of a stall.
@@ -72,6 +72,7 @@ class TmcModel {
   static constexpr int kTcoolthrsNumber = 0x14;
 
   int microsteps() const;
+  int shiftOfLoad() const;
   std::uint32_t runOf() const;
   bool isStealthy(std::uint32_t tstep) const;
   std::uint32_t status(const Senses& senses) const;
@@ -85,7 +86,7 @@ class TmcModel {
   std::uint8_t writes_ = 0;  // IFCNT
   bool was_reset_ = true;
   bool driver_error_ = false;
-  std::uint32_t first_run_ = 0;  // IRUN + 1; 0: nothing was written yet
+  std::uint32_t first_run_ = 0;  // IRUN + 1; 0: they weren't yet
   std::uint32_t stall_guard_ = 0;
 };
 

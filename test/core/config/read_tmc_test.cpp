@@ -250,6 +250,14 @@ TEST(ReadTmc, TakesAChipOnSpi) {
             Lines{"/axes/y/tmc/spi: is \"/dev/spidev0.0\", but must be another one: it is "
                   "/axes/x/tmc/spi already"});
   ConfigValue axis = spiAxis("tmc5160");
+  put(axis, "tmc/stall_threshold", -64);
+  put(axis, "tmc/mode", std::string("spreadcycle"));
+  EXPECT_EQ(readX(axis).tmc->stall->threshold, -64);
+  expectIssues(axis, {{"tmc/stall_threshold", -65, "is -65, but must be from -64 to 63"},
+                      {"tmc/stall_threshold", 64, "is 64, but must be from -64 to 63"}});
+  put(axis, "tmc/stall_fault_threshold", 10);
+  EXPECT_NE(issuesOfX(axis).front().find("is only for the TMC2209 and TMC2226"), std::string::npos);
+  axis = spiAxis("tmc5160");
   put(axis, "tmc/address", 1);
   EXPECT_NE(issuesOfX(axis).front().find("tmc/address: is not known; known here: "),
             std::string::npos);

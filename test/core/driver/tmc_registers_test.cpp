@@ -188,5 +188,28 @@ TEST(TmcRegisters, DetectStallsInAnyMotionAboveASpeed) {
   EXPECT_EQ(written(kSgthrs), 60U);
 }
 
+TEST(TmcRegisters, DetectStallsBySgtOnSpi) {
+  EXPECT_FALSE(detectsStalls(Model::kTmc2208));
+  for (const Model model : {Model::kTmc2130, Model::kTmc5160}) {
+    EXPECT_TRUE(detectsStalls(model));
+    EXPECT_EQ(stallThresholdsOf(model).least, -64);
+    EXPECT_EQ(stallThresholdsOf(model).most, 63);
+    EXPECT_EQ(loadRegisterOf(model), kDrvStatus);
+    // The lowest 10 bits of DRV_STATUS.
+    EXPECT_TRUE(isStall(model, 0xFFFFFC00, 63));
+    EXPECT_FALSE(isStall(model, 1, 63));
+    EXPECT_FALSE(isStall(model, 0x200, -64));
+  }
+  EXPECT_EQ(coolconfOf(0), 0U);
+  EXPECT_EQ(coolconfOf(63), 0x3F0000U);
+  EXPECT_EQ(coolconfOf(-1), 0x7F0000U);
+  EXPECT_EQ(coolconfOf(-64), 0x400000U);
+  // diag0_error, diag0_stall and diag1_stall; not en_pwm_mode.
+  EXPECT_EQ(gconfForStallOnSpi(), 0x1A0U);
+  EXPECT_EQ(stallThresholdsOf(Model::kTmc2209).most, 255);
+  EXPECT_TRUE(isStall(Model::kTmc2209, 120, 60));
+  EXPECT_FALSE(isStall(Model::kTmc2209, 122, 60));
+}
+
 }  // namespace
 }  // namespace stepdriver::driver::tmc

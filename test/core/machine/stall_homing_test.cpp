@@ -22,10 +22,12 @@ using axis::HomingResult;
 using test::Bench;
 using test::kStep;
 
+constexpr int kGconf = 0x00;
 constexpr int kCurrents = 0x10;
 constexpr int kChopsAbove = 0x13;
 constexpr int kStallAbove = 0x14;
 constexpr int kStallBelow = 0x40;
+constexpr int kStallOnSpi = 0x6D;
 constexpr double kMotorTorque = 0.5;  // [Nm]
 constexpr double kWallAt = -50.0;     // [mm]
 // Where the rotor stands at the wall, MSCNT is 512. The chip has told of the stall when the field
@@ -36,13 +38,20 @@ bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-config::AxisConfig stallAxis(bool has_diag = true) {
-  config::AxisConfig config = test::tmcAxis();
+/// A driver, and whether its DIAG is wired.
+struct Way {
+  const char* driver;
+  bool has_diag;
+  bool isOnSpi() const { return std::string(driver) != "tmc2209"; }
+};
+
+config::AxisConfig stallAxis(const Way& way = {"tmc2209", true}) {
+  config::AxisConfig config = way.isOnSpi() ? test::spiAxis(way.driver) : test::tmcAxis();
   config.endstop_min.reset();
   config.endstop_max.reset();
-  if (has_diag) config.fault = config::FaultPin{"x.diag"};
+  if (way.has_diag) config.fault = config::FaultPin{"x.diag"};
   config.tmc->stall.emplace();
-  config.tmc->stall->threshold = 100;
+  config.tmc->stall->threshold = way.isOnSpi() ? -40 : 100;
   config.tmc->stall->current = 0.7;
   config.homing.emplace();
   config.homing->kind = config::HomingKind::kStall;
@@ -58,6 +67,7 @@ struct WithWall {
   explicit WithWall(const config::AxisConfig& config, double friction = 0.0, bool walled = true)
       : bench({config}, specs(config, friction, walled)) {
     bench.may_exceed_limits = true;  // it stops at once
+    before = registers();
   }
   static std::vector<sim::RigAxisSpec> specs(const config::AxisConfig& config, double friction,
                                              bool walled) {
@@ -72,16 +82,21 @@ struct WithWall {
   axis::Axis& x() { return bench.axis(); }
   /// [microsteps] By how much the position is wrong, by the carriage at rest.
   double error() { return (x().state().position - bench.report().carriage / 1e3) / kStep; }
-  void expectRegistersAsBefore() {
-    EXPECT_EQ(bench.rig.registerOf("x", kCurrents) & 0x1F1FU, 0x190CU);
-    EXPECT_EQ(bench.rig.registerOf("x", kStallAbove), 0U);
-    EXPECT_EQ(bench.rig.registerOf("x", kStallBelow), 0U);
+  std::vector<std::uint32_t> registers() {
+    std::vector<std::uint32_t> values;
+    for (const int number :
+         {kGconf, kCurrents, kChopsAbove, kStallAbove, kStallBelow, kStallOnSpi}) {
+      values.push_back(bench.rig.registerOf("x", number));
+    }
+    return values;
   }
+  void expectRegistersAsBefore() { EXPECT_EQ(registers(), before); }
 
   Bench bench;
+  std::vector<std::uint32_t> before;
 };
 
-class StallHoming : public ::testing::TestWithParam<bool> {};
+class StallHoming : public ::testing::TestWithParam<Way> {};
 
 TEST_P(StallHoming, EndsWhereTheMotorIsBlocked) {
   WithWall machine(stallAxis(GetParam()));
@@ -102,13 +117,15 @@ TEST_P(StallHoming, EndsWhereTheMotorIsBlocked) {
   EXPECT_FALSE(contains(result.message, "before")) << result.message;
 }
 
-/// Of five loads, by DIAG or by the UART: STEPDRIVER_STALL_HOMINGS is how many altogether.
-int homingsOfEach() {
+/// Of five loads, by DIAG or by the bus: STEPDRIVER_STALL_HOMINGS is how many of a chip altogether.
+int homingsOfEach(const Way& way) {
   const char* const wanted = std::getenv("STEPDRIVER_STALL_HOMINGS");
-  return wanted == nullptr ? 20 : std::max(1, std::atoi(wanted) / 10);
+  if (wanted != nullptr) return std::max(1, std::atoi(wanted) / 10);
+  return way.isOnSpi() ? 5 : 20;
 }
 
-// Two hundred of them, from everywhere, at loads of up to 40 % of the torque.
+// Two hundred of a TMC2209 and fifty of each other chip, from everywhere, at loads of up to 40 % of
+// the torque.
 TEST_P(StallHoming, FindsTheSameMicrostepEachTimeByThePhase) {
   config::AxisConfig config = stallAxis(GetParam());
   config.tmc->stall->phase = kWallPhase;
@@ -117,7 +134,7 @@ TEST_P(StallHoming, FindsTheSameMicrostepEachTimeByThePhase) {
   double most = -1e9;
   for (const double friction : {0.0, 0.1, 0.2, 0.3, 0.4}) {
     WithWall machine(config, friction);
-    for (int i = 0; i < homingsOfEach(); ++i) {
+    for (int i = 0; i < homingsOfEach(GetParam()); ++i) {
       const HomingResult result = machine.x().home();
       ASSERT_EQ(result.end, HomingEnd::kHomed) << friction << ": " << result.message;
       machine.bench.machine->advance(0.3);
@@ -171,22 +188,48 @@ TEST_P(StallHoming, IsArmedAtConstantSpeedOnly) {
   config.tmc->spread_cycle_above = 400.0;
   WithWall machine(config);
   double slowest = 1.0;
+  const auto written = [&machine](int number) { return machine.bench.rig.registerOf("x", number); };
+  const std::uint32_t run = written(kCurrents) >> 8U & 0x1FU;
   machine.x().home([&] {
-    if (machine.bench.rig.registerOf("x", kStallAbove) != 0 && machine.x().state().moving) {
+    if (written(kStallAbove) != 0 && machine.x().state().moving) {
       slowest = std::min(slowest, std::abs(machine.x().state().velocity));
-      EXPECT_EQ(machine.bench.rig.registerOf("x", kCurrents) >> 8U & 0x1FU, 21U);
-      EXPECT_EQ(machine.bench.rig.registerOf("x", kChopsAbove), 0U);
+      EXPECT_LT(written(kCurrents) >> 8U & 0x1FU, run);
+      if (GetParam().isOnSpi()) {
+        EXPECT_EQ(written(kGconf) & 4U, 0U) << "it doesn't chop as in SpreadCycle";
+        EXPECT_EQ(written(kStallOnSpi), 0x580000U) << "-40 in 7 bits";
+      } else {
+        EXPECT_EQ(written(kChopsAbove), 0U);
+      }
     }
     return false;
   });
   EXPECT_NEAR(slowest, 0.05, 1e-4);
-  EXPECT_EQ(machine.bench.rig.registerOf("x", kChopsAbove), 117U);
+  machine.expectRegistersAsBefore();
+  EXPECT_GT(written(kChopsAbove), 0U);
+}
+
+TEST_P(StallHoming, KeepsItsCurrentToTheEnd) {
+  WithWall machine(stallAxis(GetParam()));
+  std::string refusal;
+  machine.x().home([&] {
+    if (!refusal.empty() || !machine.x().state().moving) return false;
+    const std::vector<std::uint32_t> now = machine.registers();
+    try {
+      machine.x().setCurrent(0.5, 0.1);
+    } catch (const Error& error) {
+      refusal = error.what();
+    }
+    EXPECT_EQ(machine.registers(), now);
+    return false;
+  });
+  EXPECT_TRUE(contains(refusal, "its current is that of a homing to a stall")) << refusal;
+  machine.expectRegistersAsBefore();
 }
 
 TEST_P(StallHoming, FailsIfItsStallsAreAtDifferentPlaces) {
   config::AxisConfig config = stallAxis(GetParam());
-  config.tmc->stall->threshold = 255;  // each load is a stall
-  WithWall machine(config, 0.1);
+  config.tmc->stall->threshold = GetParam().isOnSpi() ? -64 : 255;  // each load is a stall
+  WithWall machine(config, GetParam().isOnSpi() ? 0.7 : 0.1);
   const HomingResult result = machine.x().home();
   EXPECT_EQ(result.end, HomingEnd::kFailed) << result.message;
   EXPECT_TRUE(contains(result.message, "at different places")) << result.message;
@@ -204,14 +247,15 @@ TEST_P(StallHoming, FailsIfTheChipIsLost) {
   });
   EXPECT_EQ(result.end, HomingEnd::kFailed);
   machine.bench.machine->advance(1.5);
-  EXPECT_TRUE(contains(machine.x().state().fault, "no chip answers")) << machine.x().state().fault;
+  const char* const cause = GetParam().isOnSpi() ? "answers with zeros only" : "no chip answers";
+  EXPECT_TRUE(contains(machine.x().state().fault, cause)) << machine.x().state().fault;
 }
 
 // A machine that meets something in a move, by DIAG or by the UART.
 class StallFault : public ::testing::TestWithParam<bool> {
  protected:
   static config::AxisConfig axis() {
-    config::AxisConfig config = stallAxis(GetParam());
+    config::AxisConfig config = stallAxis({"tmc2209", GetParam()});
     config.tmc->stall_fault.emplace();
     config.tmc->stall_fault->threshold = 60;
     config.tmc->stall_fault->above = 150.0;  // 0.03 m/s
@@ -277,7 +321,7 @@ INSTANTIATE_TEST_SUITE_P(, StallFault, ::testing::Bool(),
 
 // What DIAG reports is named by the registers.
 TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
-  WithWall machine(stallAxis(true));
+  WithWall machine(stallAxis());
   machine.x().setPosition(0.0);
   machine.x().moveTo(-0.04);
   machine.bench.machine->advance(0.2);
@@ -289,8 +333,14 @@ TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
       << machine.x().state().fault;
 }
 
-INSTANTIATE_TEST_SUITE_P(, StallHoming, ::testing::Bool(),
-                         [](const auto& way) { return way.param ? "ByDiag" : "ByTheUart"; });
+INSTANTIATE_TEST_SUITE_P(, StallHoming,
+                         ::testing::Values(Way{"tmc2209", true}, Way{"tmc2209", false},
+                                           Way{"tmc2130", true}, Way{"tmc2130", false},
+                                           Way{"tmc5160", true}, Way{"tmc5160", false}),
+                         [](const auto& way) {
+                           return std::string(way.param.driver) +
+                                  (way.param.has_diag ? "ByDiag" : "ByTheBus");
+                         });
 
 }  // namespace
 }  // namespace stepdriver

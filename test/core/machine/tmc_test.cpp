@@ -26,6 +26,7 @@ namespace stepdriver {
 namespace {
 
 using test::Bench;
+using test::spiAxis;
 using test::tmcAxis;
 using test::violationsOf;
 
@@ -466,15 +467,6 @@ TEST(TmcDrivers, EndTheStepsAtOnceOrByARamp) {
   }
 }
 
-config::AxisConfig spiAxis(const std::string& driver, const std::string& name = "x",
-                           const std::string& device = "/dev/spidev0.0") {
-  config::AxisConfig config = tmcAxis(name);
-  config.driver = driver::registerChip(driver::driverChip(driver));
-  config.tmc->port = device;
-  config.tmc->baud = 0;
-  return config;
-}
-
 class TmcOnSpi : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(TmcOnSpi, IsSetUpAndMovesAsOneOnAUart) {
@@ -571,6 +563,7 @@ struct Trouble {
   std::function<void(sim::Rig&, bool there)> set;
   const char* fault;
   const char* remedy;
+  bool is_of_wire = false;  // the chip of y is on the same one
 };
 class TmcFaults : public ::testing::TestWithParam<Trouble> {};
 
@@ -599,8 +592,7 @@ TEST_P(TmcFaults, AreTold) {
   EXPECT_FALSE(x.state().moving);
   EXPECT_FALSE(x.state().position_valid);
   EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kFault);
-  // Noise is on the wire of both.
-  EXPECT_EQ(bench.axis("y").state().fault.empty(), std::string(trouble.name) != "Noise");
+  EXPECT_EQ(bench.axis("y").state().fault.empty(), !trouble.is_of_wire);
   if (std::string(trouble.name) != "Reset") {
     EXPECT_PRED2(has, failureOf([&] { bench.machine->recover(); }), trouble.fault);
     EXPECT_PRED2(has, x.state().fault, trouble.fault);
@@ -641,7 +633,14 @@ INSTANTIATE_TEST_SUITE_P(
                                 faults.flipped = there ? 1.0 : 0.0;
                                 rig.setWireFaults(kPort, faults);
                               },
-                              "damaged", "wire"}),
+                              "damaged", "wire", true},
+                      Trouble{"UnmeasuredRate",
+                              [](sim::Rig& rig, bool there) {
+                                sim::WireFaults faults;
+                                faults.unmeasured_rate = there;
+                                rig.setWireFaults(kPort, faults);
+                              },
+                              "it can't measure this baud rate", "tmc/baud", true}),
     [](const auto& trouble) { return std::string(trouble.param.name); });
 
 TEST(TmcDrivers, WarnOfHeatAndOpenCoilsWithoutAFault) {

@@ -24,4 +24,14 @@ inline config::AxisConfig tmcAxis(const std::string& name = "x", int address = 0
   return config;
 }
 
+/// The same with a driver on SPI.
+inline config::AxisConfig spiAxis(const std::string& driver, const std::string& name = "x",
+                                  const std::string& device = "/dev/spidev0.0") {
+  config::AxisConfig config = tmcAxis(name);
+  config.driver = driver::registerChip(driver::driverChip(driver));
+  config.tmc->port = device;
+  config.tmc->baud = 0;
+  return config;
+}
+
 }  // namespace stepdriver::test

@@ -13,8 +13,9 @@ enum class ChopperMode {
 
 /// How a driver chip detects a stall of its motor (StallGuard), for a homing to it.
 struct StallConfig {
-  /// 0 to 255: SG_RESULT at or below twice this is a stall. It depends on the speed, the current
-  /// and the motor.
+  /// Of a TMC2209 or TMC2226, 0 to 255: SG_RESULT at or below twice this is a stall; higher is more
+  /// sensitive. Of a TMC2130 or TMC5160, -64 to 63 (SGT): lower is more sensitive. It depends on
+  /// the speed, the current and the motor.
   int threshold = 0;
   double current = 0.0;  ///< [A rms] of a coil, while it approaches
   /// 0 to 1023: MSCNT, the place in the electrical cycle, at which the motor is blocked; empty: not

@@ -118,6 +118,8 @@ struct WireFaults {
   double doubled = 0.0;
   double flipped = 0.0;
   bool no_echo = false;  ///< the port doesn't hear what it sends
+  /// The chips can't measure the baud rate: they take no frame for one.
+  bool unmeasured_rate = false;
   /// From a byte of an answer on, the rest is heard only after the next bytes were sent.
   double late = 0.0;
 };

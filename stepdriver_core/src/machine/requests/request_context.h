@@ -11,7 +11,6 @@
 #include "activity/activities.h"
 #include "activity/context.h"
 #include "channel/channel_config.h"
-#include "driver/tmc_registers.h"
 #include "machine/named_lines.h"
 #include "machine/position_latches.h"
 #include "stepdriver_core/config/axis_config.h"
@@ -64,7 +63,6 @@ class RequestContext {
   struct CurrentChange {
     AxisId axis = 0;
     std::size_t motor = 0;
-    driver::tmc::CurrentScale scale;
     SharedCall call;
   };
   std::map<std::uint64_t, CurrentChange> current_changes;  ///< by their jobs

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "driver/tmc_registers.h"
 #include "message_text.h"
 
 namespace stepdriver::machine {
@@ -14,6 +15,11 @@ namespace {
 struct Wanted {
   double run = 0.0;
   double hold = 0.0;
+};
+
+struct Change {
+  std::size_t motor = 0;
+  driver::tmc::CurrentScale scale;
 };
 
 double checkedCurrent(const axis::AxisModel& axis, const char* what, double wanted, double least,
@@ -49,25 +55,29 @@ std::string SetCurrent::text(const AxisWords& axes) const {
 void SetCurrent::serve(RequestContext& machine, const SharedCall& call) const {
   axis::AxisModel& changed = machine.axis(axis);
   changed.refuseUnlessOpen();
-  std::vector<RequestContext::CurrentChange> changes;
+  std::vector<Change> changes;
   for (std::size_t i = 0; i < changed.motor.chips(); ++i) {
-    const motor::TmcChip* chip = changed.motor.tmcAt(i);
+    motor::TmcChip* chip = changed.motor.tmcAt(i);
     if (chip == nullptr) continue;
     const Wanted wanted = checkedCurrents(changed, *chip, *this);
     if (!chip->isSetUp()) {
       changed.refuse(changed.chipText(i) +
                      " isn't set up: it has no power, or the axis is at fault");
     }
-    changes.push_back({axis, i, chip->scaleOf(wanted.run, wanted.hold), call});
+    if (chip->isPreparedForStall()) {
+      changed.refuse("its current is that of a homing to a stall, until that ends");
+    }
+    changes.push_back({i, chip->scaleOf(wanted.run, wanted.hold)});
   }
   if (changes.empty()) {
     changed.refuse("its current is set by the board: it has no driver with `tmc`");
   }
-  for (RequestContext::CurrentChange& change : changes) {
+  for (const Change& change : changes) {
     bus::RegisterJob job = changed.motor.tmcAt(change.motor)->setCurrent(change.scale);
     job.id = machine.context.newJob();
     machine.context.out->register_jobs.push_back(job);
-    machine.current_changes.emplace(job.id, std::move(change));
+    machine.current_changes.emplace(job.id,
+                                    RequestContext::CurrentChange{axis, change.motor, call});
   }
 }
 
