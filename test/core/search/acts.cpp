@@ -264,11 +264,31 @@ std::vector<Act> makeActs() {
   };
 }
 
+std::vector<Act> makeRegisterActs() {
+  return {
+      request("all microsteps of x", machine::SetMicrosteps{kX, 16}, moving({kX})),
+      request("currents of x", machine::SetCurrent{kX, 0.5, 0.2}, {}),
+      request("configured currents of x", machine::SetCurrent{kX, 0.0, 0.0}, {}),
+      {"the chip of x is reset", [](Participants& all, int) { all.resetChip(); }},
+      {"the chip of x is silent", [](Participants& all, int) { all.silenceChip(); }},
+      {"the chip of x is hot", [](Participants& all, int) { all.heatChip(); }},
+  };
+}
+
 }  // namespace
 
 const std::vector<Act>& acts() {
-  static const std::vector<Act> all = makeActs();
+  static const std::vector<Act> all = [] {
+    std::vector<Act> made = makeActs();
+    for (Act& act : makeRegisterActs()) made.push_back(std::move(act));
+    return made;
+  }();
   return all;
+}
+
+std::size_t actsOfAny() {
+  static const std::size_t count = makeActs().size();
+  return count;
 }
 
 Act slowPath(double first, double second) {

@@ -294,5 +294,30 @@ TEST(FoundSchedules, AnEngineThatIsLateAgainAndAgainIsBehindByNoMoreThanItMayBe)
   }
 }
 
+// A fault that is there already kept the position valid, whatever the chip had lost.
+TEST(FoundSchedules, AChipThatIsResetDuringAnEmergencyStopLeavesNoPositionValid) {
+  for (const std::size_t after : {0, 4, 60}) {
+    for (const char* stop : {"emergency stop", "press the emergency stop"}) {
+      expectGood({kRegisters,
+                  {does(0, 0, "move x by -6 mm"), does(1, 500, stop),
+                   does(1, after, "the chip of x is reset"), does(0, after, "recover")},
+                  {}});
+    }
+  }
+}
+
+// The registers were written again with the currents of before the change, which was then taken
+// for what the chip had.
+TEST(FoundSchedules, CurrentsThatAreOnTheirWayAreThoseOfTheRegistersAfterARecover) {
+  for (std::size_t after = 0; after < 12; ++after) {
+    for (std::size_t later = 0; later < 6; ++later) {
+      expectGood({kRegisters,
+                  {does(0, 0, "the chip of x is reset"), does(1, after, "currents of x"),
+                   does(0, later, "recover")},
+                  {}});
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::search

@@ -82,18 +82,41 @@ std::size_t any(std::mt19937_64& random, std::size_t count) {
 
 void deviate(Schedule& schedule, std::mt19937_64& random) {
   const std::size_t count = 1 + any(random, 3);
-  // Only a port with a horizon has a board.
-  const std::size_t participants = kParticipants - (schedule.ahead ? 0 : 1);
+  std::vector<Who> participants;
+  for (std::size_t i = 0; i < kParticipants; ++i) {
+    const auto who = static_cast<Who>(i);
+    const bool is_of_bus = who == Who::kBus || who == Who::kBusDone;
+    // Only a port with a horizon has a board.
+    if (who == Who::kBoard ? schedule.ahead.has_value()
+                           : !is_of_bus || schedule.variant == kRegisters) {
+      participants.push_back(who);
+    }
+  }
   for (std::size_t i = 0; i < count; ++i) {
     static constexpr std::array<std::size_t, 6> steps = {1, 2, 4, 10, 40, 200};
     static constexpr std::array<std::size_t, 4> reach = {10, 30, 120, 600};
     schedule.deviations.push_back({any(random, reach[any(random, reach.size())]),
-                                   static_cast<Who>(any(random, participants)),
+                                   participants[any(random, participants.size())],
                                    steps[any(random, steps.size())]});
   }
 }
 
-std::size_t pairs() { return acts().size() * acts().size() * kAfter.size() * kVariants; }
+/// Those of a machine of any variant.
+std::size_t actsOf(int variant) { return variant == kRegisters ? acts().size() : actsOfAny(); }
+
+/// With a chip with registers, the first or the second act is about it.
+std::vector<std::size_t> actsOfRegisters() {
+  std::vector<std::size_t> about{actNamed("home x"), actNamed("microsteps of x"),
+                                 actNamed("recover"), actNamed("disable x")};
+  for (std::size_t act = actsOfAny(); act < acts().size(); ++act) about.push_back(act);
+  return about;
+}
+
+std::size_t pairsOfAny() { return actsOfAny() * actsOfAny() * kAfter.size() * (kVariants - 1); }
+
+std::size_t pairs() {
+  return pairsOfAny() + 2 * actsOfRegisters().size() * acts().size() * kAfter.size();
+}
 
 /// Maps a number to a pair of acts, a time between them, and a variant.
 Schedule pairOf(std::size_t number) {
@@ -103,10 +126,20 @@ Schedule pairOf(std::size_t number) {
     return digit;
   };
   Schedule schedule;
-  schedule.variant = static_cast<int>(take(kVariants));
+  if (number >= pairsOfAny()) {
+    number -= pairsOfAny();
+    schedule.variant = kRegisters;
+    const std::size_t after = kAfter[take(kAfter.size())];
+    const std::size_t other = take(acts().size());
+    const bool is_first = take(2) == 0;
+    const std::size_t about = actsOfRegisters()[number];
+    schedule.items = {{is_first ? about : other, 0, 0}, {is_first ? other : about, 1, after}};
+    return schedule;
+  }
+  schedule.variant = static_cast<int>(take(kVariants - 1));
   const std::size_t after = kAfter[take(kAfter.size())];
-  const std::size_t second = take(acts().size());
-  schedule.items = {{take(acts().size()), 0, 0}, {second, 1, after}};
+  const std::size_t second = take(actsOfAny());
+  schedule.items = {{take(actsOfAny()), 0, 0}, {second, 1, after}};
   return schedule;
 }
 
@@ -115,9 +148,9 @@ double anyPart(std::mt19937_64& random) {
 }
 
 /// One of acts(), or a slow path at speeds from 1e-6 to 1e-3 m/s.
-Item anyItem(std::mt19937_64& random) {
+Item anyItem(std::mt19937_64& random, int variant) {
   constexpr std::size_t kSlowPaths = 30;  // one in so many
-  Item item{any(random, acts().size()), static_cast<int>(any(random, 2)),
+  Item item{any(random, actsOf(variant)), static_cast<int>(any(random, 2)),
             kAfter[any(random, kAfter.size())]};
   if (any(random, kSlowPaths) != 0) return item;
   const auto speed = [&] { return 1e-6 * std::pow(1e3, anyPart(random)); };
@@ -129,7 +162,9 @@ Item anyItem(std::mt19937_64& random) {
 Schedule tripleOf(std::mt19937_64& random) {
   Schedule schedule;
   schedule.variant = static_cast<int>(any(random, kVariants));
-  for (std::size_t i = 0; i < 3 + any(random, 2); ++i) schedule.items.push_back(anyItem(random));
+  for (std::size_t i = 0; i < 3 + any(random, 2); ++i) {
+    schedule.items.push_back(anyItem(random, schedule.variant));
+  }
   return schedule;
 }
 
@@ -157,8 +192,8 @@ Schedule crowdOf(std::mt19937_64& random) {
   Schedule schedule;
   schedule.variant = static_cast<int>(any(random, kVariants));
   for (std::size_t i = 0; i < 5 + any(random, 5); ++i) {
-    const std::size_t act =
-        any(random, 5) != 0 ? motions[any(random, motions.size())] : any(random, acts().size());
+    const std::size_t act = any(random, 5) != 0 ? motions[any(random, motions.size())]
+                                                : any(random, actsOf(schedule.variant));
     schedule.items.push_back(
         {act, static_cast<int>(any(random, 2)), after[any(random, after.size())]});
   }

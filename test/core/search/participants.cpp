@@ -7,12 +7,15 @@
 #include <cerrno>
 #include <cmath>
 
+#include "bus/open_port.h"
+#include "driver/tmc_registers.h"
 #include "guard/emergency_stops.h"
 #include "motor/input_shaping.h"
 #include "stepdriver_core/error.h"
 #include "support/constants.h"
 #include "support/corexy_bench.h"
 #include "support/gantry_bench.h"
+#include "support/tmc_axis.h"
 #include "trajectory/path_plan.h"
 #include "trajectory/queued_path.h"
 
@@ -65,10 +68,49 @@ constexpr double kLoadFalls = 20.0;
 /// How far the second motor of an axis is ahead at the start. [mm]
 constexpr double kRacked = 1.5;
 
+/// An access to a register at 115200 baud, and one that nobody answers.
+constexpr pulse::Nanoseconds kAccess = 3 * kMillisecond;
+constexpr pulse::Nanoseconds kSilence = 90 * kMillisecond;
+/// Each trouble of a chip is known after this time.
+constexpr pulse::Nanoseconds kTroubleIsKnown = 1'500 * kMillisecond;
+/// [mm] Where a block stops x if it is homed by a stall: it has no min switch.
+constexpr double kBlock = -9.0;
+
 /// In this variant x and y share their motors, as on a CoreXY.
 constexpr int kSharing = 3;
 /// In this one the motions of x and z are shaped, and those of y aren't.
 constexpr int kShaped = 4;
+
+bool hasRegisters(const std::vector<config::AxisConfig>& configs) {
+  return configs.front().tmc.has_value();
+}
+
+int microstepsOf(std::uint32_t chopconf) {
+  return driver::tmc::kFinest >> (chopconf >> driver::tmc::kMresShift & 0xFU);
+}
+
+/// x of kRegisters.
+config::AxisConfig axisWithRegisters() {
+  config::AxisConfig config = test::tmcAxis("x");
+  config.acceleration = config.deceleration = 2.0;
+  config.endstop_min.reset();
+  config.min_position = kBlock / 1e3 + 0.0005;
+  config.fault = config::FaultPin{"x.fault"};
+  config.align_on_microstep_change = true;
+  config.idle_timeout = 0.05;
+  config.idle_action = config::IdleAction::kLowerCurrent;
+  config.tmc->idle_current = 0.1;
+  config.tmc->stall.emplace();
+  config.tmc->stall->threshold = 100;
+  config.tmc->stall->current = 0.7;
+  config.homing.emplace();
+  config.homing->kind = config::HomingKind::kStall;
+  config.homing->seek_speed = 0.05;
+  config.homing->pull_off = 0.004;
+  config.homing->offset = kBlock / 1e3;
+  config.homing->max_travel = 0.04;
+  return config;
+}
 
 }  // namespace
 
@@ -94,6 +136,7 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   configs[2].idle_timeout = 0.03;
   configs[2].driver.in_position_active = true;
   configs[2].in_position = config::InPositionPin{"z.in_position", Bias::kAsIs, 0.05};
+  if (variant == kRegisters) configs[0] = axisWithRegisters();
   if (variant != 1) configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
   if (variant != 0) configs[2].idle_action = config::IdleAction::kSleep;
   if (variant == 1) {
@@ -212,7 +255,7 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
   for (std::size_t axis = 0; axis < configs.size(); ++axis) {
     const config::AxisConfig& config = configs[axis];
     for (sim::RigAxisSpec& spec : test::rigMotors(config)) {
-      spec.min_switch->position = -9.0;
+      if (spec.min_switch) spec.min_switch->position = -9.0;
       spec.max_switch->position = 16.0;
       spec.settling_ns = 5 * kMillisecond;
       if (config.brake) spec.load_falls = kLoadFalls;
@@ -226,6 +269,11 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
       }
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
+      if (config.tmc) {
+        spec.block_min = kBlock;
+        spec.motor = sim::soundMotor({}, spec.limits->rate / config.microsteps,
+                                     spec.limits->acceleration / config.microsteps);
+      }
       if (isEngineLate(schedule) || latestPlayOf(schedule) > 0) {
         spec.limits->late = lateStepsOf(config);
       }
@@ -279,8 +327,8 @@ bool givesNoReason(const std::string& text) {
 
 const char* nameOf(Who who) {
   static const std::array<const char*, kParticipants> names = {
-      "news",   "pin done", "input",    "request",  "timer", "engine",
-      "writer", "watcher",  "client A", "client B", "clock", "board"};
+      "news",    "pin done", "input",    "request", "timer", "engine", "writer",
+      "watcher", "client A", "client B", "clock",   "board", "bus",    "bus done"};
   return names.at(static_cast<std::size_t>(who));
 }
 
@@ -324,6 +372,15 @@ Participants::Participants(const Schedule& schedule)
   news_ = std::make_unique<News>(*core_);
   engine_->listen(*news_);
   watched_ = readInputs();
+  if (hasRegisters(configs_)) {
+    trace_->setMicrosteps(0, configs_[0].microsteps);
+    const config::TmcConfig& tmc = *configs_[0].tmc;
+    registers_ = bus::openPort(
+        tmc.port, tmc.baud,
+        [this, port = tmc.port](const std::uint8_t* bytes, std::size_t count, bool pause) {
+          return rig_.onBytes(port, bytes, count, pause, clock_.now());
+        });
+  }
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     hulls_[axis].begin(0.0, kHullTolerance * roundingOf(axis));
     lowest_limits_[axis].deceleration = configs_[axis].deceleration;
@@ -350,6 +407,7 @@ void Participants::turnEnded(const machine::MachineSnapshot& /*before*/,
           .push_back({follow.serial, follow.group != 0});
     }
   }
+  if (hasRegisters(configs_)) noteTrouble();
 }
 
 void Participants::write(const activity::PinJob& job) {
@@ -360,6 +418,39 @@ void Participants::write(const activity::PinJob& job) {
   written.error = std::exchange(next_pin_error_, 0);
   pins_failed_ = pins_failed_ || written.error != 0 || written.returns != clock_.now();
   jobs_.push_back(written);
+}
+
+void Participants::access(const bus::RegisterJob& job) {
+  Access begun;
+  begun.job = job;
+  if (accesses_.empty()) begun.due = clock_.now() + kAccess;
+  accesses_.push_back(std::move(begun));
+}
+
+// The next access of the job whose turn it is. What its chip doesn't answer takes longer.
+void Participants::accessRegister() {
+  Access& access = accesses_.front();
+  if (!access.ended) {
+    const bus::RegisterAccess& next = access.job.accesses[access.next++];
+    bus::RegisterJob one = access.job;
+    one.accesses = {next};
+    const bus::RegisterDone done = bus::carryOut(one, *registers_, {});
+    const bool failed = done.failure != bus::Failure::kNone;
+    access.done.failure = done.failure;
+    access.done.failed_number = done.failed_number;
+    access.done.found = done.found;
+    access.done.values.insert(access.done.values.end(), done.values.begin(), done.values.end());
+    access.ended = failed || access.next == access.job.accesses.size();
+    access.due = clock_.now() + (failed ? kSilence : kAccess);
+    const bool sets_mode =
+        next.number == driver::tmc::kChopconf && next.kind == bus::RegisterAccess::Kind::kWriteBack;
+    if (!failed && sets_mode) trace_->setMicrosteps(0, microstepsOf(next.value));
+    if (!access.ended || failed) return;
+  }
+  access.done.id = access.job.id;
+  accesses_done_.push_back(access.done);
+  accesses_.pop_front();
+  if (!accesses_.empty()) accesses_.front().due = clock_.now() + kAccess;
 }
 
 void Participants::answer(std::uint64_t call, activity::Reply reply) {
@@ -455,7 +546,11 @@ bool Participants::canGo(Who who) {
     case Who::kRequest:
       return !requests_.empty();
     case Who::kTimer:
-      return clock_.now() >= core_->due();
+      return clock_.now() >= core_->dueWithPolls();
+    case Who::kBus:
+      return !accesses_.empty() && clock_.now() >= accesses_.front().due;
+    case Who::kBusDone:
+      return !accesses_done_.empty();
     case Who::kEngine:
       return engineIsDue();
     case Who::kBoard:
@@ -491,8 +586,9 @@ bool Participants::isDelayed(Who who) const {
 
 bool Participants::step() {
   static constexpr std::array<Who, kParticipants> turns = {
-      Who::kNews,   Who::kPinDone, Who::kInput, Who::kRequest, Who::kTimer,   Who::kEngine,
-      Who::kWriter, Who::kWatcher, Who::kBoard, Who::kClientA, Who::kClientB, Who::kClock};
+      Who::kNews,  Who::kPinDone, Who::kBusDone, Who::kInput, Who::kRequest,
+      Who::kTimer, Who::kEngine,  Who::kWriter,  Who::kBus,   Who::kWatcher,
+      Who::kBoard, Who::kClientA, Who::kClientB, Who::kClock};
   std::optional<Who> late;
   for (const Who who : turns) {
     if (!canGo(who)) continue;
@@ -556,6 +652,11 @@ void Participants::act(Who who) {
       pins_done_.pop_front();
       return core_->handle(done);
     }
+    case Who::kBusDone: {
+      const bus::RegisterDone done = accesses_done_.front();
+      accesses_done_.pop_front();
+      return core_->handle(done);
+    }
     case Who::kInput:
       core_->takeInput();
       return;
@@ -589,6 +690,8 @@ void Participants::act(Who who) {
       return advanceTo(nextDue());
     case Who::kBoard:
       return port_->play(clock_.now());
+    case Who::kBus:
+      return accessRegister();
   }
 }
 
@@ -666,7 +769,8 @@ pulse::Nanoseconds Participants::nextDue() {
   };
   look(engine_due_);
   if (port_) look(port_->playDue());
-  look(core_->due());
+  look(core_->dueWithPolls());
+  if (!accesses_.empty()) look(accesses_.front().due);
   look(watch_due_);
   for (const Client& client : clients_) {
     if (client.next || hasTurn(client)) look(client.from);
@@ -1527,7 +1631,7 @@ void Participants::checkEdge(const machine::LatchedEdge& edge) {
   const machine::LatchedAxis& x = edge.axes.front();
   if (x.name != configs_[0].name || !x.position_valid || position_changed_) return;
   if (!schedule_.deviations.empty() || schedule_.ahead) return;
-  if (steps_failed_[0] || chip_broke_[0] || power_was_lost_) return;
+  if (steps_failed_[0] || chip_broke_[0] || power_was_lost_ || had_trouble_) return;
   const auto snapshot = controller_->snapshot();
   const double step = 1e3 * roundingOf(0) / snapshot->axes[0].steps_per_unit;  // [mm]
   const double place = 1e3 * x.position;
@@ -1626,6 +1730,83 @@ void Participants::breakChip(std::size_t axis) {
   rig_.setFaults(configs_[axis].name, faults);
 }
 
+void Participants::resetChip() {
+  if (!hasRegisters(configs_)) return;
+  rig_.brownOut(configs_[0].name);
+  trouble_since_ = clock_.now();
+  had_trouble_ = true;
+}
+
+void Participants::silenceChip() {
+  if (!hasRegisters(configs_)) return;
+  rig_.powerChip(configs_[0].name, false);
+  is_silent_ = true;
+  trouble_since_ = clock_.now();
+  had_trouble_ = true;
+}
+
+void Participants::heatChip() {
+  if (!hasRegisters(configs_)) return;
+  sim::TmcTrouble trouble;
+  trouble.over_temperature = true;
+  rig_.setTrouble(configs_[0].name, trouble);
+  trouble_since_ = clock_.now();
+  had_trouble_ = true;
+}
+
+// No fault is said to be one of the registers without a cause there.
+void Participants::noteTrouble() {
+  const axis::AxisState x = controller_->snapshot()->axes[0].state;
+  if (x.fault.empty()) return;
+  trouble_since_.reset();
+  const bool has_cause = had_trouble_ || chip_broke_[0] || steps_failed_[0];
+  if (!has_cause && x.fault.find("TMC") != std::string::npos) {
+    oracle_.complain(configs_[0].name + " is at fault, though nothing is wrong: " + x.fault);
+  }
+}
+
+// Each is known in time, except to a machine that was shut down.
+void Participants::checkTroubles() {
+  if (!had_trouble_) return;
+  const pulse::Nanoseconds known = clock_.now() + kTroubleIsKnown;
+  playUntil([&] { return clock_.now() >= known; }, kLongestCall);
+  const axis::AxisState x = controller_->snapshot()->axes[0].state;
+  if (closed_ || !trouble_since_ || !x.fault.empty() || !x.drivers->front().is_set_up) return;
+  oracle_.complain(fmt::format("the trouble of {}'s chip at {} ns isn't known at {} ns",
+                               configs_[0].name, *trouble_since_, clock_.now()));
+}
+
+// At rest they are what the axis says of its driver.
+void Participants::checkRegisters() {
+  namespace tmc = driver::tmc;
+  if (!hasRegisters(configs_)) return;
+  if (!playUntil([this] { return accesses_.empty() && accesses_done_.empty(); }, kLongestCall)) {
+    return oracle_.complain("the jobs on registers don't end");
+  }
+  const axis::AxisState x = controller_->snapshot()->axes[0].state;
+  const driver::DriverState& told = x.drivers->front();
+  if (!told.is_set_up || !x.fault.empty()) return;
+  const auto expect = [this](const char* what, double is, double should) {
+    if (std::abs(is - should) <= 1e-9) return;
+    oracle_.complain(fmt::format("{} of x's chip is {}, but the axis says {}", what, is, should));
+  };
+  const auto written = [this](int number) { return rig_.registerOf(configs_[0].name, number); };
+  const std::uint32_t chopconf = written(tmc::kChopconf);
+  expect("the microsteps", microstepsOf(chopconf), x.microsteps);
+  expect("TOFF", chopconf & tmc::kToff, 3);
+  const tmc::Board board{tmc::Model::kTmc2209, configs_[0].tmc->sense_resistor};
+  const tmc::CurrentRange range{(chopconf & tmc::kVsense) != 0, 256};
+  const std::uint32_t currents = written(tmc::kIholdIrun);
+  const auto current = [&](unsigned shift) {
+    return tmc::currentOf(static_cast<int>(currents >> shift & 0x1FU), range, board);
+  };
+  expect("the run current", current(8), told.run_current);
+  expect("the hold current", current(0), told.hold_current);
+  for (const int of_stall : {tmc::kTcoolthrs, tmc::kSgthrs}) {
+    expect("a register of stalls", written(of_stall), 0);
+  }
+}
+
 // Participants that wait for their turn may see the loss much later.
 void Participants::checkPowered(std::size_t axis, pulse::Nanoseconds now) {
   if (!power_lost_since_) return;
@@ -1675,6 +1856,8 @@ void Participants::mendLines() {
     position_changed_ = true;
   }
   lines_->fail(-1, 0);
+  if (had_trouble_) rig_.setTrouble(configs_[0].name, {});
+  if (std::exchange(is_silent_, false)) rig_.powerChip(configs_[0].name, true);
   for (const config::AxisConfig& config : configs_) {
     rig_.clearWriteFault(config.pins.step.line);
     rig_.clearWriteFault(config.pins.dir.line);
@@ -1767,6 +1950,16 @@ void Participants::checkCounts(const std::string& when) {
 sim::RigAxisReport Participants::reportOf(const std::string& rig_axis) const {
   sim::RigAxisReport report = rig_.report(rig_axis);
   if (power_was_lost_) report.violations.erase(sim::Violation::kStepWithoutPower);
+  if (had_trouble_ && rig_axis == configs_[0].name) {
+    // Without its registers, a chip makes other steps, or none, from any moment on.
+    for (const sim::Violation known :
+         {sim::Violation::kStepWhileDisabled, sim::Violation::kStepAfterEnable,
+          sim::Violation::kModeHold, sim::Violation::kAboveTopRate,
+          sim::Violation::kAboveAcceleration}) {
+      report.violations.erase(known);
+    }
+    report.beyond_limits.clear();
+  }
   return report;
 }
 
@@ -1816,7 +2009,9 @@ void Participants::checkRest() {
   const auto snapshot = controller_->snapshot();
   for (std::size_t i = 0; i < kAxes; ++i) {
     const machine::AxisSnapshot& axis = snapshot->axes[i];
-    if (!axis.state.position_valid) continue;
+    // A machine that was shut down asks no chip.
+    const bool is_unasked = i == 0 && had_trouble_ && closed_;
+    if (!axis.state.position_valid || is_unasked) continue;
     const pulse::ChannelState live = engine_->channel(static_cast<int>(i));
     const axis::AxisState state = machine::stateOf(axis, live, clock_.now(), clock_.now());
     const double carriage = rig_.report(configs_[i].name).carriage / 1000.0;
@@ -1963,7 +2158,7 @@ void Participants::probeAxis(std::size_t axis) {
   };
   must("all limits", machine::SetLimits{axis, {}});
   must("override 1", machine::SetSpeedOverride{1.0});
-  must("wake", machine::Sleep{axis, false});
+  if (configs_[axis].pins.sleep.wired()) must("wake", machine::Sleep{axis, false});
   must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
   const double way = before > 3.0 ? -0.002 : 0.002;
@@ -1984,6 +2179,22 @@ void Participants::probeAxis(std::size_t axis) {
     oracle_.complain(name + " was to move 2 mm, but its carriage has moved " +
                      std::to_string(moved) + " mm");
   }
+}
+
+// Polls of registers never end: nothing else will come, as all is held.
+bool Participants::isStuck() {
+  if (!hasRegisters(configs_) || !controller_->snapshot()->axes.front().state.held) return false;
+  const bool all_wait = std::all_of(clients_.begin(), clients_.end(), [](const Client& client) {
+    return client.idle() || (client.waits() && !client.waits_for_stops);
+  });
+  const bool next_waits =
+      next_item_ == schedule_.items.size() ||
+      clients_[static_cast<std::size_t>(schedule_.items[next_item_].client)].waits();
+  if (!all_wait || !next_waits || !requests_.empty() || !jobs_.empty()) return false;
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    if (engine_->channel(static_cast<int>(i)).following != 0) return false;
+  }
+  return !core_->hasNews();
 }
 
 std::vector<std::string> Participants::run() {
@@ -2009,7 +2220,8 @@ std::vector<std::string> Participants::run() {
   // An item may wait for the slow motion of the one before it.
   const auto longest = kLongestCall * static_cast<pulse::Nanoseconds>(
                                           std::max<std::size_t>(1, schedule_.items.size()));
-  if (!playUntil(played, longest) && !held() && !schedule_.may_last) {
+  const auto over = [&] { return played() || isStuck(); };
+  if (!playUntil(over, longest) && !held() && !schedule_.may_last) {
     for (const auto& [id, asked] : open_) oracle_.complain(asked.name + " isn't answered");
     for (const Client& client : clients_) {
       if (client.waits_for_stops) oracle_.complain("the emergency stop isn't answered");
@@ -2028,6 +2240,7 @@ std::vector<std::string> Participants::run() {
     checkPower();
     for (std::size_t i = 0; i < kAxes; ++i) rig_.setFaults(configs_[i].name, {});
     pressEmergencyStop(false);
+    checkTroubles();
     mendLines();
     next_pin_error_ = 0;
     next_pin_hang_ = 0;
@@ -2044,6 +2257,7 @@ std::vector<std::string> Participants::run() {
   if (oracle_.complaints.empty()) checkOutcomes();
   if (oracle_.complaints.empty()) checkCounts("at rest");
   if (oracle_.complaints.empty()) checkRest();
+  if (oracle_.complaints.empty()) checkRegisters();
   if (oracle_.complaints.empty()) checkCompared();
   if (oracle_.complaints.empty()) checkLatches();
   for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);
@@ -2052,6 +2266,7 @@ std::vector<std::string> Participants::run() {
     note("probe");
     probe();
   }
+  if (oracle_.complaints.empty()) checkRegisters();
   if (oracle_.complaints.empty()) checkCounts("in the end");
   for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);
   return oracle_.complaints;

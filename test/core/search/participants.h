@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "bus/register_job.h"
+#include "bus/register_port.h"
 #include "machine/controller.h"
 #include "machine/shell_core.h"
 #include "machine/wiring.h"
@@ -42,9 +44,11 @@ enum class Who {
   kClientA,
   kClientB,
   kClock,
-  kBoard,  ///< what plays the steps that were put ahead of time; not with a GpioPort
+  kBoard,    ///< what plays the steps that were put ahead of time; not with a GpioPort
+  kBus,      ///< an access to a register of a chip; only with such a chip
+  kBusDone,  ///< the controller takes the end of a job on registers; the same
 };
-constexpr std::size_t kParticipants = 12;
+constexpr std::size_t kParticipants = 14;
 const char* nameOf(Who who);
 
 /// From the n-th step after the script's first request, a participant has to wait for some steps.
@@ -65,7 +69,9 @@ struct Item {
 };
 
 /// Machines that a schedule can be played on.
-constexpr std::size_t kVariants = 5;
+constexpr std::size_t kVariants = 6;
+/// In this one the driver of x has registers on a UART, and is homed by its stall.
+constexpr int kRegisters = 5;
 /// The axes of one of them, as it is configured by default.
 std::vector<config::AxisConfig> configsOf(int variant);
 
@@ -102,6 +108,8 @@ struct Turn {
   Act act;
 };
 const std::vector<Act>& acts();
+/// How many of them, from the first on, are for any machine; the rest is for kRegisters.
+std::size_t actsOfAny();
 const Act& actOf(const Item& item);
 /// A path of x and y of two lines at these speeds [m/s], which the client watches.
 Act slowPath(double first, double second);
@@ -180,6 +188,12 @@ class Participants : private machine::ShellCore::Host {
   void failSwitch(std::size_t axis);
   void failEmergencyStop();
   void mendLines();
+  /// @name Troubles of the chip of x, if it has registers; lines that work again end them.
+  /// @{
+  void resetChip();
+  void silenceChip();
+  void heatChip();
+  /// @}
   void failNextPin(int error) { next_pin_error_ = error; }
   void hangNextPin(pulse::Nanoseconds time) { next_pin_hang_ = time; }
   void loseEdges() { loses_edges_ = true; }
@@ -210,6 +224,14 @@ class Participants : private machine::ShellCore::Host {
     pulse::Nanoseconds returns = 0;
     int error = 0;
     bool told = false;
+  };
+  /// A job on registers, one access after the other.
+  struct Access {
+    bus::RegisterJob job;
+    bus::RegisterDone done;
+    std::size_t next = 0;
+    pulse::Nanoseconds due = pulse::kNever;
+    bool ended = false;
   };
   struct Client {
     std::uint64_t waits_for = 0;  // a call; 0: doesn't wait
@@ -246,10 +268,16 @@ class Participants : private machine::ShellCore::Host {
                  const std::shared_ptr<const machine::MachineSnapshot>& now,
                  activity::Outputs& out) override;
   void write(const activity::PinJob& job) override;
+  void access(const bus::RegisterJob& job) override;
   void answer(std::uint64_t call, activity::Reply reply);
   void note(const std::string& what);
   void watch();
   void writeLines();
+  void accessRegister();
+  void noteTrouble();
+  void checkTroubles();
+  void checkRegisters();
+  bool isStuck();
   void beginItem();
   bool itemReady() const;
   bool hasTurn(const Client& client) const;
@@ -361,6 +389,12 @@ class Participants : private machine::ShellCore::Host {
   std::deque<Ask> requests_;
   std::deque<activity::PinDone> pins_done_;
   std::deque<Job> jobs_;
+  std::unique_ptr<bus::RegisterPort> registers_;
+  std::deque<Access> accesses_;
+  std::deque<bus::RegisterDone> accesses_done_;
+  std::optional<pulse::Nanoseconds> trouble_since_;  // of x's chip; empty: it is known
+  bool had_trouble_ = false;
+  bool is_silent_ = false;
   pulse::Nanoseconds engine_due_ = 0;
   pulse::Nanoseconds engine_waits_since_ = pulse::kNever;
   std::vector<int> watched_;

@@ -32,7 +32,7 @@ class EdgeHash {
 };
 
 /// Reports each rising STEP edge of the rig, with the number of its axis, and counts them. The
-/// chips are A4988s.
+/// chips are A4988s, or have registers.
 class RiseWatch : public sim::PinTrace {
  public:
   explicit RiseWatch(std::vector<std::string> axes) : axes_(std::move(axes)) {
@@ -44,6 +44,8 @@ class RiseWatch : public sim::PinTrace {
 
   /// [1/16 steps] Where the pulses have taken the motor of an axis.
   std::int64_t place(std::size_t axis) const { return motors_.at(axis).place; }
+  /// The mode of a chip with registers.
+  void setMicrosteps(std::size_t axis, int microsteps) { motors_.at(axis).step = 16 / microsteps; }
 
   void begin(const std::vector<sim::TracePin>& pins, const std::vector<bool>& levels,
              std::int64_t /*time_ns*/) override {
