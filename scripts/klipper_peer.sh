@@ -35,7 +35,8 @@ program=$(readlink -f "$program")
 choose_build_folder
 install_packages core
 build_peer() {
-  configure_core && cmake --build "$build/core" -j "$jobs" --target klipper_tests peer_lines
+  configure_core -DSTEPDRIVER_TESTS=ON &&
+    cmake --build "$build/core" -j "$jobs" --target klipper_tests peer_lines
 }
 say "Building"
 quietly klipper-peer-build build_peer
