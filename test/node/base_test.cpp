@@ -185,6 +185,7 @@ TEST_F(BaseTest, DrivesNowhereByALatchedCommandThatComesAgainWithANewConnection)
 }
 
 TEST_F(BaseTest, DrivesNowhereByACommandThatWasLatchedBeforeItsStart) {
+  set("cmd_vel_timeout", 60.0);
   node.start();
   publisher = ros::NodeHandle().advertise<geometry_msgs::Twist>(node.beside("cmd_vel"), 1, true);
   publish(0.3, 0.0);

@@ -122,7 +122,8 @@ TEST_F(Draw, GoesThroughDots) {
   EXPECT_EQ(report.pulses_forward, (std::vector<std::int64_t>{1600, 2400}));
 }
 
-// Its last corner, by sine and cosine, is 1e-15 mm off its first: a line without a step.
+// Its last corner, by sine and cosine, is 1e-15 mm off its first: the line that closes it makes no
+// step.
 TEST_F(Draw, ReachesTheEndOfAClosedShape) {
   node.traced();
   node.start();
@@ -132,7 +133,7 @@ TEST_F(Draw, ReachesTheEndOfAClosedShape) {
     const double angle = corner * kPi / 4.0;
     octagon << 20.0 + 10.0 * std::cos(angle) << " " << 10.0 * std::sin(angle) << "\n";
   }
-  write("0 0\n" + octagon.str());
+  write("0 0\n" + octagon.str() + "30 0\n");
   const auto end = draw({"--tolerance", "0.05"});
   EXPECT_EQ(end.code, 0) << end.output;
   expectSays(end.output, "100 %");
