@@ -16,6 +16,7 @@
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/PathSegment.h>
+#include <stepdriver/SetCurrent.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
 #include <stepdriver/SetPositionCompare.h>
@@ -396,6 +397,15 @@ bool DriverCalls::setPosition(std::size_t axis, double position) {
   const std::string name = kAxisNames.at(axis) + "/set_position";
   return call(requestOf(Kind::kSetPosition, 1U << axis, name + " " + shown(position)), name,
               service);
+}
+
+bool DriverCalls::setCurrent(std::size_t axis, double run, double hold) {
+  SetCurrent service;
+  service.request.run_current = run;
+  service.request.hold_current = hold;
+  const std::string name = kAxisNames.at(axis) + "/set_current";
+  return call(requestOf(Kind::kOther, 1U << axis, name + " " + shown(run) + " " + shown(hold)),
+              name, service);
 }
 
 bool DriverCalls::compare(std::size_t axis, double from, double to) {

@@ -83,6 +83,8 @@ class DriverCalls {
   bool microstep(std::size_t axis, int microsteps);
   bool setLimits(std::size_t axis, double max_speed, double acceleration, double jerk);
   bool setPosition(std::size_t axis, double position);
+  /// [A rms]
+  bool setCurrent(std::size_t axis, double run, double hold);
   /// The position of an axis switches the output kOutput: it is on between two places.
   bool compare(std::size_t axis, double from, double to);
   bool speedOverride(double factor);

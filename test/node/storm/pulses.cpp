@@ -6,6 +6,8 @@
 namespace stepdriver::storm {
 namespace {
 
+using Trace = std::map<std::string, node_test::Waveform>;
+
 /// The level of a waveform at times that never decrease.
 class Level {
  public:
@@ -40,25 +42,37 @@ int sixteenths(bool ms1, bool ms2, bool ms3) {
   }
 }
 
+/// The number of 1/16 steps of a pulse at times that never decrease.
+class StepSize {
+ public:
+  StepSize(const Trace& trace, const std::string& axis) {
+    // A driver with registers has no such pins, and stays in its mode.
+    if (trace.count(axis + "/ms1") == 0) return;
+    for (const char* pin : {"/ms1", "/ms2", "/ms3"}) pins_.emplace_back(trace.at(axis + pin));
+  }
+
+  int at(std::int64_t time) {
+    if (pins_.empty()) return 1;
+    return sixteenths(pins_[0].at(time), pins_[1].at(time), pins_[2].at(time));
+  }
+
+ private:
+  std::vector<Level> pins_;
+};
+
 }  // namespace
 
-std::vector<Pulse> pulsesOf(const std::map<std::string, node_test::Waveform>& trace,
-                            const std::string& axis) {
-  const auto waveform = [&](const char* pin) -> const node_test::Waveform& {
-    return trace.at(axis + "/" + pin);
-  };
-  Level dir(waveform("dir"));
-  Level ms1(waveform("ms1"));
-  Level ms2(waveform("ms2"));
-  Level ms3(waveform("ms3"));
+std::vector<Pulse> pulsesOf(const Trace& trace, const std::string& axis) {
+  Level dir(trace.at(axis + "/dir"));
+  StepSize step_size(trace, axis);
   std::vector<Pulse> pulses;
   std::int64_t count = 0;
-  const auto& step = waveform("step").edges;
-  const bool both_edges = waveform("step").both_edges;
+  const auto& step = trace.at(axis + "/step").edges;
+  const bool both_edges = trace.at(axis + "/step").both_edges;
   for (std::size_t i = 1; i < step.size(); ++i) {
     if (!step[i].level && !both_edges) continue;
     const std::int64_t time = step[i].time_ns;
-    const int size = sixteenths(ms1.at(time), ms2.at(time), ms3.at(time));
+    const int size = step_size.at(time);
     count += dir.at(time) ? size : -size;
     pulses.push_back({time, count});
   }

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <thread>
 
+#include "storm/storm_machine.h"
 #include "support/wait.h"
 
 namespace stepdriver::storm {
@@ -130,7 +131,10 @@ void StormClient::sendSetting() {
     calls_.compare(axis, from, from + between(0.001, 0.02));
   } else if (what < 0.72) {
     calls_.setPosition(axis, anyPosition());
-  } else if (what < 0.85) {
+  } else if (what < 0.78) {
+    const double run = between(0.2, kHighestCurrent);
+    calls_.setCurrent(kWithRegisters, run, between(0.1, run));
+  } else if (what < 0.88) {
     calls_.microstep(chance(0.5) ? 0 : 2, chance(0.5) ? 16 : 8);
   } else {
     pressSwitch();

@@ -69,7 +69,12 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node) {
   node.set("axes/x/homing/pull_off_mm", 2.0);
   node.set("axes/x/homing/max_travel_mm", 250.0);
   node.set("axes/x/homing/offset_mm", -52.0);
-  facts.push_back(setUpAxis(node, "y", pins, {40.0, 200.0, 0.0}));
+  facts.push_back(setUpAxis(node, "y", {"step", "dir"}, {40.0, 200.0, 0.0}));
+  node.set("axes/y/driver", "tmc2209");
+  node.set("axes/y/tmc/port", "/dev/serial0");
+  node.set("axes/y/tmc/address", 0);
+  node.set("axes/y/tmc/sense_resistor_mohm", 110.0);
+  node.set("axes/y/tmc/run_current_a", kHighestCurrent);
   node.set("axes/y/backlash_mm", 8.0);
   facts.back().backlash = 8e-3;
   for (const char* axis : {"x", "y"}) {
