@@ -6,20 +6,26 @@
 #include <stepdriver/SetCurrent.h>
 
 #include <cmath>
+#include <regex>
 #include <string>
+#include <vector>
 
 #include "support/node_under_test.h"
+#include "support/program.h"
 #include "support/recorder.h"
 #include "support/says.h"
+#include "support/temporary_file.h"
 
 // A driver on a UART: its currents and its state, by service, topic and diagnostics.
 
 namespace stepdriver::node_test {
 namespace {
 
-class TmcNode : public testing::Test {
- protected:
-  TmcNode() {
+/// x has a driver on a UART.
+class NodeWithTmc : public NodeUnderTest {
+ public:
+  NodeWithTmc() {
+    NodeUnderTest& node = *this;
     node.set("axes/x/driver", "tmc2209");
     for (const char* pin : {"ms1", "ms2", "ms3", "sleep", "reset"}) {
       node.erase(std::string("axes/x/pins/") + pin);
@@ -30,6 +36,26 @@ class TmcNode : public testing::Test {
     node.set("axes/x/tmc/run_current_a", 0.8);
   }
 
+  /// It is homed by its stall, and has no switch.
+  void homesToStall(int threshold) {
+    erase("axes/x/endstops");
+    set("axes/x/tmc/stall_threshold", threshold);
+    set("axes/x/homing/kind", "stall");
+    set("axes/x/homing/towards", "min");
+    set("axes/x/homing/seek_speed_mm_s", 50.0);
+    set("axes/x/homing/pull_off_mm", 8.0);
+    set("axes/x/homing/max_travel_mm", 250.0);
+  }
+
+  ProgramEnd tuneStall(const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{"--node", name(), "--axis", "x", "--distance", "150"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return runProgram("tune_stall", arguments);
+  }
+};
+
+class TmcNode : public testing::Test {
+ protected:
   SetCurrent::Response setCurrent(double run, double hold) {
     SetCurrent::Request request;
     request.run_current = run;
@@ -37,7 +63,7 @@ class TmcNode : public testing::Test {
     return node.call<SetCurrent>("x/set_current", request);
   }
 
-  NodeUnderTest node;
+  NodeWithTmc node;
 };
 
 TEST_F(TmcNode, MovesAndChangesItsMicrosteps) {
@@ -78,6 +104,46 @@ TEST_F(TmcNode, ShowsWhatItsDriverSaysAndTakesAnotherCurrent) {
     }
     return false;
   }));
+}
+
+// First the load is measured; with the threshold that it leads to, the homings are checked.
+TEST_F(TmcNode, ItsStallIsTunedByATool) {
+  const TemporaryFile picture(".svg");
+  int threshold = 0;
+  {
+    NodeWithTmc measured;
+    measured.set("simulation/speed", 1.0);
+    measured.set("simulation/axes/x/motor/friction_nm", 0.02);
+    measured.start();
+    const ProgramEnd end = measured.tuneStall({"--speed", "50", "-o", picture.path()});
+    ASSERT_EQ(end.code, 0) << end.output;
+    expectSays(end.output, "forward: SG_RESULT from");
+    expectSays(end.output, "back: SG_RESULT from");
+    expectSays(picture.text(), "SG_RESULT");
+    std::smatch found;
+    ASSERT_TRUE(std::regex_search(end.output, found, std::regex("stall_threshold: (\\d+)")));
+    threshold = std::stoi(found[1]);
+    const SetCurrent::Response current = measured.call<SetCurrent>("x/set_current");
+    EXPECT_NEAR(current.run_current, 0.795, 1e-3) << "the current is as before";
+  }
+  NodeWithTmc homed;
+  homed.homesToStall(threshold);
+  homed.set("simulation/axes/x/start_mm", 60.0);
+  homed.start();
+  const ProgramEnd end = homed.tuneStall({"--check", "--homings", "4"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  expectSays(end.output, "4: MSCNT ");
+  expectSays(end.output, "4 homings ended within ");
+  expectSays(end.output, "stall_phase: ");
+}
+
+TEST_F(TmcNode, StallsAreTunedForChipsThatMeasureThemOnly) {
+  node.set("axes/x/tmc/mode", "spreadcycle");
+  node.start();
+  const ProgramEnd end = node.tuneStall({"--speed", "50"});
+  EXPECT_EQ(end.code, 1);
+  expectSays(end.output, "the chip measures its load with stealthchop only");
+  EXPECT_EQ(node.pulses(), 0);
 }
 
 TEST_F(TmcNode, HasNoSuchTopicWithoutTmc) {
