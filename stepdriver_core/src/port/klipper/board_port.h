@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -15,19 +14,13 @@
 
 namespace stepdriver::klipper {
 
-/// An input of a board, and the level that it has last reported.
-struct BoardInput {
-  std::uint32_t oid = 0;
-  std::atomic<int> level{0};
-};
-
 /// Plays the steps of channels by the steppers of boards.
 ///
-/// Steps are collected for a fifth of the horizon, compressed, and sent. The
-/// boards watch the switches by themselves: each channel has a `trsync`, which stops its motors at
-/// one instant when a switch of the direction that is played, or a fault output, becomes active, or
-/// when the steps are taken back. The boards say where the motors stand: every 10 ms while they
-/// move, and after each stop. Only that tells what was played.
+/// Steps are collected for a fifth of the horizon, compressed, and sent. The boards watch the
+/// switches by themselves: each channel has a `trsync`, which stops its motors at one instant when
+/// a switch of the direction that is played, or a fault output, becomes active, or when the steps
+/// are taken back. The boards say where the motors stand: every 10 ms while they move, and after
+/// each stop. Only that tells what was played.
 class BoardPort final : public pulse::StepPort {
  public:
   /// A motor on its board.
