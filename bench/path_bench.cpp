@@ -55,6 +55,17 @@ PathRequest circles(std::size_t segments) {
   return request;
 }
 
+/// A circle of 20 mm in as many lines.
+PathRequest circle(std::size_t segments) {
+  PathRequest request = emptyRequest(2);
+  for (std::size_t i = 1; i <= segments; ++i) {
+    const double angle =
+        2.0 * std::acos(-1.0) * static_cast<double>(i) / static_cast<double>(segments);
+    request.segments.push_back(lineTo({0.02 * (std::cos(angle) - 1.0), 0.02 * std::sin(angle)}));
+  }
+  return request;
+}
+
 /// Lines of about 2 mm in random directions.
 PathRequest zigzag(std::size_t segments) {
   PathRequest request = emptyRequest(3);
@@ -107,9 +118,11 @@ void plan(benchmark::State& state, PathRequest (*make)(std::size_t), double jerk
   }
   const std::vector<motion::PathOrigin> origins(axes.size());
   std::size_t points = 0;
+  double seconds = 0.0;
   for (auto round : state) {
     const motion::PathPlan plan = motion::planPath(request, axes, origins);
     points = plan.points.size();
+    seconds = plan.points.back().time;
     const motion::PreparedTrajectory prepared(axes, plan.points,
                                               std::vector<motion::MotionState>(axes.size()));
     benchmark::DoNotOptimize(&prepared);
@@ -117,6 +130,7 @@ void plan(benchmark::State& state, PathRequest (*make)(std::size_t), double jerk
   const auto rounds = static_cast<std::int64_t>(state.iterations());
   state.SetItemsProcessed(rounds * static_cast<std::int64_t>(kSegments));
   state.counters["points_per_segment"] = static_cast<double>(points) / kSegments;
+  state.counters["motion_s"] = seconds;
 }
 BENCHMARK_CAPTURE(plan, circles, circles)->Name("Path/circles_of_lines");
 BENCHMARK_CAPTURE(plan, zigzag, zigzag)->Name("Path/random_lines");
@@ -124,6 +138,7 @@ BENCHMARK_CAPTURE(plan, chords, chords)->Name("Path/chords");
 BENCHMARK_CAPTURE(plan, waves, waves)->Name("Path/beziers");
 constexpr double kJerk = 20.0 * 80'000.0;  // microsteps/s^3
 BENCHMARK_CAPTURE(plan, smooth_circles, circles, kJerk)->Name("Path/circles_of_lines_with_jerk");
+BENCHMARK_CAPTURE(plan, smooth_circle, circle, kJerk)->Name("Path/circle_of_1000_lines_with_jerk");
 BENCHMARK_CAPTURE(plan, smooth_zigzag, zigzag, kJerk)->Name("Path/random_lines_with_jerk");
 BENCHMARK_CAPTURE(plan, smooth_chords, chords, kJerk)->Name("Path/chords_with_jerk");
 BENCHMARK_CAPTURE(plan, smooth_waves, waves, kJerk)->Name("Path/beziers_with_jerk");

@@ -15,6 +15,7 @@
 #include "knot_quintic.h"
 #include "limit_usage.h"
 #include "moving_average.h"
+#include "optimal_motion.h"
 #include "path_speed.h"
 #include "profile/errors.h"
 #include "profile/profile.h"
@@ -49,6 +50,9 @@ constexpr double kNearFoot = 1e-3;
 constexpr int kMostDivisionRounds = 4;
 constexpr std::size_t kPartsOfDivision = 4;
 constexpr int kMostPlansOnPath = 40;
+// Most motions keep to their limits after one tightening. One along 1000 random lines, which has
+// other knots after each of them, needs eight.
+constexpr int kMostTightenings = 8;
 constexpr double kSlowerBy = 1.5;  // factor between two durations if knots are too close
 constexpr int kLooks = 8;          // parts of a quintic at whose ends its deviation is looked at
 
@@ -103,7 +107,13 @@ class JerkLimitedSection {
   }
 
   Plan fastest() {
-    return onThePath([&] { return bestOfTimes(); });
+    return onThePath([&] {
+      Plan average = bestOfTimes();
+      // What continues another motion, or will be continued, begins at the knots of an average.
+      if (moves() || path_.continues()) return average;
+      std::optional<Plan> optimum = optimumFrom(average);
+      return optimum && optimum->isBetterThan(average) ? *std::move(optimum) : std::move(average);
+    });
   }
 
   /// The motion from rest to rest along lines that passes each corner between them at a constant
@@ -280,6 +290,31 @@ class JerkLimitedSection {
     return plan;
   }
 
+  // The optimum, found from another motion from rest to rest. The result is empty if that is too
+  // short.
+  //
+  // The limits hold at the ends of its pieces. What a quintic exceeds in between tightens them on
+  // its way.
+  std::optional<Plan> optimumFrom(const Plan& given) const {
+    OptimalMotion motion(grid_, limits_, squares_, middles_, given.knots, given.time);
+    std::optional<Plan> best;
+    for (int round = 0; round <= kMostTightenings && motion.solve(); ++round) {
+      Plan plan = planParts(motion.parts());
+      for (std::size_t i = 1; i < plan.knots.size(); ++i) {
+        const LimitUsage usage = usageBefore(plan.knots, i, grid_);
+        if (usage.most() < 1.0 + kNoExcess) continue;
+        const double from = plan.knots[i - 1].distance;
+        const double to = plan.knots[i].distance;
+        const double margin = kMargin * (to - from);
+        motion.tighten(from + margin, to - margin, usage);
+      }
+      const bool done = plan.slowdown < 1.0 + kNoExcess;
+      if (!best || plan.isBetterThan(*best)) best = std::move(plan);
+      if (done) break;
+    }
+    return best;
+  }
+
   // The knots of a motion, and their segments.
   // @param time, average see makeKnots() and closestKnots() [s].
   Plan planOf(const PathGrid& grid, const std::vector<AveragedPart>& parts, double time,
@@ -352,11 +387,21 @@ class JerkLimitedSection {
 
   void findCaps() {
     const Reachability speed(path_, grid_, limits_);
+    const std::size_t axes = limits_.size();
     caps_.clear();
+    squares_.clear();
+    middles_.assign(grid_.size() * axes, 0.0);
+    PathPoint middle;
     double distance = 0.0;
     for (std::size_t i = 0; i < grid_.size(); ++i) {
-      caps_.push_back({distance, distance + grid_[i].length, capOf(i, speed)});
-      distance += grid_[i].length;
+      const double length = grid_[i].length;
+      if (!grid_[i].straight) {
+        grid_.evaluateAt(i, length / 2.0, middle);
+        std::copy(middle.second.begin(), middle.second.end(), &middles_[i * axes]);
+      }
+      squares_.push_back({speed.capAtBegin(i), speed.capAtEnd(i)});
+      caps_.push_back({distance, distance + length, capOf(i)});
+      distance += length;
     }
   }
 
@@ -594,7 +639,7 @@ class JerkLimitedSection {
     }
   }
 
-  double capOf(std::size_t interval, const Reachability& speed) const;
+  double capOf(std::size_t interval) const;
 
   // Makes a plan, and adds what exceeds a limit in it to `lowered`.
   Plan planOnce(double time, Lowered& lowered) const {
@@ -855,23 +900,26 @@ class JerkLimitedSection {
   PathGrid grid_;
   double stretch_ = 1.0;           // by this factor, the motion takes longer than planned
   std::vector<CeilingSpan> caps_;  // each interval's cap of the speed
+  // For each interval, the squares of the caps at its ends, and the axes' second derivatives in its
+  // middle.
+  std::vector<OptimalMotion::Caps> squares_;
+  std::vector<double> middles_;
 };
 
 // [unit/s] The highest constant speed along an interval.
-double JerkLimitedSection::capOf(std::size_t interval, const Reachability& speed) const {
-  double cap = std::sqrt(std::min(speed.capAtBegin(interval), speed.capAtEnd(interval)));
+double JerkLimitedSection::capOf(std::size_t interval) const {
+  double cap = std::sqrt(std::min(squares_[interval].begin, squares_[interval].end));
   if (grid_[interval].straight) return cap;
-  PathPoint middle;
   const double length = grid_[interval].length;
-  grid_.evaluateAt(interval, length / 2.0, middle);
   for (std::size_t j = 0; j < limits_.size(); ++j) {
     const double begin = grid_.secondAtBegin(interval)[j];
     const double end = grid_.secondAtEnd(interval)[j];
+    const double middle = middles_[interval * limits_.size() + j];
     // The slope of the parabola through the three second derivatives.
-    const double third = std::max(std::abs(-3.0 * begin + 4.0 * middle.second[j] - end),
-                                  std::abs(begin - 4.0 * middle.second[j] + 3.0 * end)) /
+    const double third = std::max(std::abs(-3.0 * begin + 4.0 * middle - end),
+                                  std::abs(begin - 4.0 * middle + 3.0 * end)) /
                          length;
-    const double second = std::max({std::abs(begin), std::abs(middle.second[j]), std::abs(end)});
+    const double second = std::max({std::abs(begin), std::abs(middle), std::abs(end)});
     const double acceleration = std::min(limits_[j].acceleration, limits_[j].deceleration);
     if (second > 0.0) cap = std::min(cap, std::sqrt(acceleration / second));
     if (third > 0.0) cap = std::min(cap, std::cbrt(limits_[j].jerk / third));

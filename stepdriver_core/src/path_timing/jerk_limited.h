@@ -34,6 +34,9 @@ namespace stepdriver::motion {
 /// there, and the corner isn't rounded (PathTiming::stops): no motion takes longer than with a
 /// stop at each corner.
 ///
+/// A section from rest to rest that won't be continued takes the optimum that is found from this
+/// average, if it is faster (see OptimalMotion).
+///
 /// A section from rest along lines whose corners are rounded one by one needs no average if it
 /// won't be continued: each line has the fastest motion from one speed to another, and each corner
 /// a constant speed, which a look-ahead chooses (see cornerSpeeds()). On a straight line this is

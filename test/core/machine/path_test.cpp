@@ -566,13 +566,14 @@ TEST_F(SmoothPath, RunsMoreSlowlyAtASpeedOverride) {
   expectLimits(20.0, 10.0);
 }
 
-// A single S-curve would take up to 0.85 s.
+// A single S-curve would take up to 0.85 s. The motion is at its jerk limits, so that the stop has
+// to follow its own decelerations.
 TEST_F(SmoothPath, ComesToRestWithinTheNextCorners) {
   for (const double at : {0.2, 0.25, 0.3, 0.4}) {
     const CoordinatedMove move = followPath(corrugated());
     advance(at);
     machine().hold();
-    advance(0.25);
+    advance(0.35);
     EXPECT_TRUE(state("x").held);
     EXPECT_EQ(state("x").velocity, 0.0) << at;
     machine().resume();

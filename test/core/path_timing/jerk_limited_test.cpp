@@ -155,8 +155,22 @@ TEST(JerkLimitedTiming, PassesACircleOfLinesWithoutStopping) {
   EXPECT_LE(smooth, 1.5 * fastest);
 }
 
+// The moving average that the optimum begins with takes 1.502 s. At 0.1 m/s and without ramps, the
+// circle would take 1.257 s.
+TEST(JerkLimitedTiming, PassesDenseChordsNearlyAtTheirHighestSpeed) {
+  std::vector<CurveSegment> segments;
+  for (int i = 1; i <= 1000; ++i) {
+    const double angle = 2.0 * kPi * i / 1000.0;
+    segments.push_back(lineTo({1600.0 * std::cos(angle) - 1600.0, 1600.0 * std::sin(angle)}, 4.0));
+  }
+  const std::vector<TimingLimits> limits(2, {8000.0, 80'000.0, 80'000.0, 1.6e6});
+  const Path path({0.0, 0.0}, segments, 1.0, Continuity::kCurvature);
+  EXPECT_LE(secondsOf(motion::planJerkLimited(path, limits).knots), 1.31);
+}
+
 // On random paths: limits, rest at both ends, the distance from the path, and the duration against
-// that without a jerk limit, which no motion with one can go below. The Beziers of the last paths
+// that without a jerk limit, which no motion with one can go below by more than the 2 % or so that
+// it is above its own optimum (see IsNearTheOptimumOnRandomPaths). The Beziers of the last paths
 // lack handles.
 TEST(JerkLimitedTiming, KeepsLimitsOnRandomPaths) {
   std::mt19937 random(2027);
@@ -221,7 +235,7 @@ TEST(JerkLimitedTiming, KeepsLimitsOnRandomPaths) {
     const double ratio =
         secondsOf(knots) /
         secondsOf(motion::planAccelerationLimited(rounded, given_path.limits).knots);
-    EXPECT_GE(ratio, 0.995) << "path " << i;
+    EXPECT_GE(ratio, 0.97) << "path " << i;
     if (i >= kPaths) continue;
     worst_ratio = std::max(worst_ratio, ratio);
     ratios += ratio;
@@ -250,7 +264,8 @@ double demandBetween(const TimingKnot& from, const TimingKnot& to,
 }
 
 // Only the places at which a limit is exceeded become slower: on 500 lines in random directions,
-// the motion is at a limit in every part that takes a second.
+// the motion is at a limit in every part that takes a second, less the 0.15 of the jerk that is
+// left for a stop along the path.
 TEST(JerkLimitedTiming, IsNotSlowedDownAsAWholeForOnePlace) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> way(-160.0, 160.0);
@@ -270,7 +285,7 @@ TEST(JerkLimitedTiming, IsNotSlowedDownAsAWholeForOnePlace) {
   }
   demands.pop_back();  // is shorter
   const double least = *std::min_element(demands.begin(), demands.end());
-  EXPECT_GE(least, 0.99);
+  EXPECT_GE(least, 0.84);
   RecordProperty("least", std::to_string(least));
   RecordProperty("seconds", std::to_string(secondsOf(knots)));
 }
@@ -491,8 +506,8 @@ TEST(JerkLimitedTiming, IsNearTheOptimumOnRandomPaths) {
     jerk_ratios +=
         optimum / secondsOf(motion::planAccelerationLimited(path, given_path.limits).knots);
   }
-  EXPECT_LE(ratios / kPaths, 1.09);
-  EXPECT_LE(worst, 1.5);
+  EXPECT_LE(ratios / kPaths, 1.02);
+  EXPECT_LE(worst, 1.15);
   RecordProperty("mean_ratio", std::to_string(ratios / kPaths));
   RecordProperty("worst_ratio", std::to_string(worst));
   RecordProperty("optimum_with_jerk_to_without", std::to_string(jerk_ratios / kPaths));

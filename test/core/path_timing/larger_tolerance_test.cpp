@@ -116,12 +116,13 @@ TEST(LargerTolerance, MakesNoAccelerationLimitedMotionLonger) {
   RecordProperty("worst", std::to_string(growth.worst()));
 }
 
-// The moving average of another plan may be longer by some percent.
+// The optimum is found from the best moving average, and where the motion stops is chosen among
+// the motions that are found: another choice may be longer by some percent.
 TEST(LargerTolerance, MakesFewJerkLimitedMotionsLonger) {
   GrowthOfDurations growth(Continuity::kCurvature);
   growth.tryPaths(pathsToTry(40));
-  EXPECT_LE(growth.growing(), 0.2 * growth.paths()) << growth.text();
-  EXPECT_LE(growth.worst(), 1.2) << growth.text();
+  EXPECT_LE(growth.growing(), 0.15 * growth.paths()) << growth.text();
+  EXPECT_LE(growth.worst(), 1.06) << growth.text();
   RecordProperty("growing", growth.growing());
   RecordProperty("worst", std::to_string(growth.worst()));
 }
