@@ -32,6 +32,7 @@ bool DebouncedInput::poll(const Context& context) {
   if (level < 0 || active == active_) return false;
   active_ = active;
   changed_ = left;
+  change_was_read_ = left_was_read_;
   return true;
 }
 
@@ -49,6 +50,7 @@ void DebouncedInput::noteChange(const Context& context, bool has_changed) {
   }
   if (left_) return;
   left_ = quiet_since_;
+  left_was_read_ = !tells;
   for (std::size_t i = edges.size(); tells && i-- > 0;) {
     if (*left_ - time_of(i) > debounce_) break;
     left_ = time_of(i);

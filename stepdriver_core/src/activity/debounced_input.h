@@ -26,6 +26,9 @@ class DebouncedInput {
   /// Clock time at which it began to change last: of the first edge, or of the reading if no edge
   /// was reported. Empty: it has not changed since begin().
   std::optional<pulse::Nanoseconds> changed() const { return changed_; }
+  /// No edge was reported of that change: it was read later, by up to the time between two
+  /// readings.
+  bool changeWasRead() const { return change_was_read_; }
   /// errno of its last reading; 0: it could be read.
   int error() const { return level_ && *level_ < 0 ? -*level_ : 0; }
   int line() const { return line_; }
@@ -48,7 +51,9 @@ class DebouncedInput {
   pulse::Nanoseconds quiet_since_ = 0;      // the latest change of its level after that
   pulse::Nanoseconds polled_at_ = 0;
   bool active_ = false;
+  bool left_was_read_ = false;  // no edge tells of left_
   std::optional<pulse::Nanoseconds> changed_;
+  bool change_was_read_ = false;
 };
 
 }  // namespace stepdriver::activity

@@ -20,6 +20,9 @@ constexpr double kIndexMargin = 0.1;  // [turns]
 constexpr int kMostFlagDebounces = 50;
 // How often the way since the flag is compared with a turn: no event tells of it.
 constexpr pulse::Nanoseconds kIndexLookPeriod = 10'000'000;
+// A kernel loses edges when its queue of events overflows, which is rare. One that reports none
+// has no interrupt for this line.
+constexpr int kMostApproaches = 3;
 
 using axis::HomingPhase;
 
@@ -77,9 +80,9 @@ void HomingToFlag::slowDown() {
 
 void HomingToFlag::observe() {
   if (!flag_.poll(context())) return;
-  passed_.push_back({flag_.active(), placeAt(*flag_.changed())});
+  passed_.push_back({flag_.active(), placeAt(*flag_.changed()), flag_.changeWasRead()});
   const int direction = axis_.directionAtTime(context().motionTimeAt(*flag_.changed()));
-  if (has_flag_ && direction != 0) {
+  if (has_flag_ && direction != 0 && !flag_.changeWasRead()) {
     places_.at(direction, flag_.active()) = passed_.back().place;
   }
 }
@@ -193,7 +196,7 @@ std::optional<HomingToFlag::Edge> HomingToFlag::indexEdge() const {
   for (const gpio::EdgeEvent& edge : axis_.inputs.since(index.signal.line, phaseBegan())) {
     if (edge.level != index.signal.active) continue;
     const double place = placeAt(edge.time_ns);
-    if (!edge_ || towards_ * (place - *edge_) > 0.0) return Edge{true, place};
+    if (!edge_ || towards_ * (place - *edge_) > 0.0) return Edge{true, place, false};
   }
   return std::nullopt;
 }
@@ -202,6 +205,7 @@ bool HomingToFlag::hasLatched() {
   const bool to_centre = config_.kind == config::HomingKind::kFlagCentre;
   if (has_flag_ && !edge_ && !passed_.empty()) edge_ = passed_.front().place;
   if (to_centre) return passed_.size() >= 2;
+  if (edgeWasLost()) return true;
   if (config_.kind != config::HomingKind::kIndex) return edge_.has_value();
   if (has_flag_ && !edge_) return false;
   if (const auto index = indexEdge()) {
@@ -217,7 +221,29 @@ bool HomingToFlag::hasLatched() {
   return false;
 }
 
+bool HomingToFlag::edgeWasLost() const {
+  const std::size_t counted = config_.kind == config::HomingKind::kFlagCentre ? 2 : 1;
+  const auto end = passed_.begin() + static_cast<std::ptrdiff_t>(std::min(counted, passed_.size()));
+  return has_flag_ &&
+         std::any_of(passed_.begin(), end, [](const Edge& edge) { return edge.was_read; });
+}
+
+void HomingToFlag::approachAgain() {
+  if (++approaches_ == kMostApproaches) {
+    return failNow(
+        fmt::format("the kernel has reported no edge of {} when it changed, in {} approaches: "
+                    "its place is only known to the time between two readings",
+                    sensor(), kMostApproaches));
+  }
+  edge_.reset();
+  centre_.clear();
+  // The middle's second latch ends where its first one begins.
+  if (direction_ != towards_ && !flag_.active()) return seek(HomingPhase::kLatching, towards_);
+  seek(HomingPhase::kBackingOff, -towards_);
+}
+
 void HomingToFlag::latched() {
+  if (edgeWasLost()) return approachAgain();
   switch (config_.kind) {
     case config::HomingKind::kIndex:
       trigger_ = *index_;

@@ -39,7 +39,8 @@ class HomingToFlag final : public Homing {
   /// An edge of the flag, or of the index, that the axis has passed.
   struct Edge {
     bool active = false;
-    double place = 0.0;  ///< [microsteps] of the joint
+    double place = 0.0;     ///< [microsteps] of the joint
+    bool was_read = false;  ///< no edge was reported: its place is only known roughly
   };
 
   void seek(axis::HomingPhase phase, double direction);
@@ -50,6 +51,8 @@ class HomingToFlag final : public Homing {
   bool hasLatched();
   void settled();
   void latched();
+  bool edgeWasLost() const;
+  void approachAgain();
   void metEndstop(bool at_max);
   double placeAt(pulse::Nanoseconds clock_time) const;
   std::optional<Edge> indexEdge() const;
@@ -65,6 +68,7 @@ class HomingToFlag final : public Homing {
   double direction_ = 0.0;
   bool began_active_ = false;  // the flag was, when the phase began
   bool slowing_ = false;
+  int approaches_ = 0;           // whose edges the kernel has not reported
   bool returns_ = false;         // it has turned at an endstop before it has met the flag
   std::vector<Edge> passed_;     // edges of the flag in this phase
   std::vector<double> centre_;   // [microsteps] edges for the middle of the flag

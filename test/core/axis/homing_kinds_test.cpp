@@ -496,6 +496,85 @@ TEST_F(HomingToFlagTest, KnowsThePlaceOfTheJointWithABacklash) {
   EXPECT_NEAR(x().state().position - config.homing->offset, joint - trigger, 1e-9);
 }
 
+/// A rig of which the kernel doesn't report some edges.
+class ForgetfulRig : public sim::Rig {
+ public:
+  using sim::Rig::Rig;
+  /// @param loses whether the edge with this number, from 1, is lost.
+  void forget(std::function<bool(int)> loses) { loses_ = std::move(loses); }
+  void watchInput(int line, gpio::EdgeListener listener) override {
+    if (!listener) return sim::Rig::watchInput(line, nullptr);
+    sim::Rig::watchInput(line, [this, listener](bool level, std::int64_t time_ns) {
+      if (!loses_(++edges_)) listener(level, time_ns);
+    });
+  }
+
+ private:
+  std::function<bool(int)> loses_;
+  int edges_ = 0;
+};
+
+struct ForgetfulHoming {
+  HomingResult result;
+  double error = 0.0;  // [steps] of the home position
+};
+
+/// A homing from 0 to the flag from 20 to 30 mm, or to its middle.
+ForgetfulHoming homeForgetful(HomingKind kind, const std::function<bool(int)>& loses) {
+  const config::AxisConfig config = flagAxis(kind);
+  std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
+  sim::SwitchSpec contact;
+  contact.line = "io.flag";
+  contact.active_level = true;
+  contact.position = 20.0;
+  contact.end = 30.0;
+  specs[0].flags.push_back(contact);
+  machine::MachineOptions options;
+  options.inputs = {inputOf("flag")};
+  ForgetfulRig rig(specs, nullptr, {}, {}, Bench::ioOf(options));
+  rig.forget(loses);
+  pulse::VirtualClock clock;
+  gpio::SimulatedBackend backend(rig, [&clock] { return clock.now(); });
+  test::UnthreadedMachine machine({config}, backend, clock, options);
+  ForgetfulHoming homing{machine.axis("x").home()};
+  const double trigger = kind == HomingKind::kFlag ? 0.02 : 0.025;
+  homing.error = (homing.result.position - config.homing->offset -
+                  (rig.report("x").carriage / 1000.0 - trigger)) /
+                 kStep;
+  return homing;
+}
+
+// Whichever edges are lost, the place of the one that counts is exact. Without a loss the latch to
+// the flag is its third edge, and those to its middle are the third to the sixth.
+TEST_F(HomingToFlagTest, ApproachesAgainIfTheKernelHasLostTheEdge) {
+  for (const HomingKind kind : {HomingKind::kFlag, HomingKind::kFlagCentre}) {
+    const double usual = homeForgetful(kind, [](int) { return false; }).error;
+    for (int first = 1; first <= 8; ++first) {
+      for (int last = first; last <= 8; ++last) {
+        const ForgetfulHoming homing =
+            homeForgetful(kind, [first, last](int edge) { return edge >= first && edge <= last; });
+        if (homing.result.end == HomingEnd::kFailed) {
+          EXPECT_NE(homing.result.message.find("no edge of the input flag"), std::string::npos)
+              << homing.result.message;
+          EXPECT_GE(last - first, 4) << "three approaches need more";
+          continue;
+        }
+        EXPECT_NEAR(homing.error, usual, 1e-3) << first << " to " << last;
+      }
+    }
+  }
+}
+
+TEST_F(HomingToFlagTest, FailsIfTheKernelReportsNoEdgeOfTheFlag) {
+  const ForgetfulHoming homing = homeForgetful(HomingKind::kFlag, [](int) { return true; });
+  EXPECT_EQ(homing.result.end, HomingEnd::kFailed);
+  EXPECT_NE(homing.result.message.find(
+                "x isn't homed: the kernel has reported no edge of the input flag when it changed, "
+                "in 3 approaches: its place is only known to the time between two readings"),
+            std::string::npos)
+      << homing.result.message;
+}
+
 // ---- an index ----
 
 TEST_F(HomingToFlagTest, TakesTheIndexAfterTheFlag) {
