@@ -23,6 +23,10 @@ class Dump {
   void add(Bias bias) { add(static_cast<int>(bias)); }
   void add(const config::Pin& pin) { all(pin.line, pin.inverted); }
   void add(const config::InputSwitch& input) { all(input.line, input.active_level, input.bias); }
+  void add(const config::Endstop& endstop) {
+    add(static_cast<const config::InputSwitch&>(endstop));
+    add(endstop.shared);
+  }
   void add(const machine::HeartbeatConfig& heartbeat) { all(heartbeat.line, heartbeat.rate); }
   void add(const config::MotorPowerConfig& power) {
     all(power.line, power.active_level, power.on_ns, power.off_delay_ns, power.feedback,
@@ -90,7 +94,8 @@ class Dump {
     }
     all(axis.brake, axis.homing, axis.require_homing, axis.enable_on_start,
         axis.disable_on_shutdown, axis.align_on_microstep_change, axis.idle_timeout,
-        static_cast<int>(axis.idle_action), axis.holds_position_unpowered);
+        static_cast<int>(axis.idle_action), axis.holds_position_unpowered, axis.switch_release,
+        axis.assumed_end_is_max);
   }
   void add(const setup::SimulatedAxis& rig) {
     all(rig.start, rig.switch_hysteresis, rig.bounces, rig.bounce_ms, rig.min_switch,

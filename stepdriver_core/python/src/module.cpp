@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "errors.h"
+#include "latches.h"
 #include "moves.h"
 #include "requests.h"
 #include "session.h"
@@ -268,6 +269,49 @@ void setPositionCompare(const Session& session, const std::string& output, const
   session.run([&](OpenMachine& open) { open.machine().setPositionCompare(output, compare); });
 }
 
+// ---- edges ----
+
+LatchHandle latch(const SessionPointer& session, const std::string& input, const std::string& edge,
+                  bool every, const Names& axes,
+                  const std::optional<std::tuple<std::string, double, double>>& window) {
+  machine::LatchRequest request;
+  request.input = input;
+  request.edge = edge == "active"     ? machine::LatchEdge::kActive
+                 : edge == "inactive" ? machine::LatchEdge::kInactive
+                                      : machine::LatchEdge::kEither;
+  request.every = every;
+  request.axes = axes;
+  if (window) {
+    const auto& [axis, from, to] = *window;
+    request.window = machine::LatchWindow{axis, from, to};
+  }
+  return {session, session->run([&](OpenMachine& open) { return open.machine().latch(request); })};
+}
+
+py::dict probe(const Session& session, const std::string& input, const py::dict& positions,
+               const std::map<std::string, bool>& manner,
+               const std::map<std::string, double>& values) {
+  machine::ProbeRequest request;
+  request.input = input;
+  for (const machine::StreamMessage& one : messagesOf(positions, {})) {
+    request.names.push_back(one.name);
+    request.positions.push_back(one.value);
+  }
+  request.relative = manner.at("relative");
+  request.away = manner.at("away");
+  request.must = manner.at("must");
+  request.returns = manner.at("go_back");
+  request.velocity = values.at("velocity");
+  request.second_velocity = values.at("second_velocity");
+  request.back_off = values.at("back_off");
+  Interruption interruption;
+  const machine::ProbeResult result = session.run([&](OpenMachine& open) {
+    return open.machine().probe(request, [&interruption] { return interruption.asked(); });
+  });
+  interruption.raise();
+  return valueOf(result);
+}
+
 setup::Simulation& simulationOf(OpenMachine& open) {
   setup::Simulation* const simulation = open.hardware().simulation();
   if (simulation == nullptr) throw Refused("there is no rig: the machine drives GPIO lines");
@@ -310,6 +354,24 @@ py::dict reportOf(const Session& session, const std::string& name) {
 }
 
 // ---- bindings ----
+
+void bindLatches(py::module_& module) {
+  py::class_<LatchHandle>(module, "LatchHandle")
+      .def("take",
+           [](const LatchHandle& self) {
+             py::list edges;
+             for (const machine::LatchedEdge& edge : self.take()) edges.append(valueOf(edge));
+             return edges;
+           })
+      .def("result", [](const LatchHandle& self) { return valueOf(self.result()); })
+      .def(
+          "wait",
+          [](const LatchHandle& self, std::optional<double> longest) {
+            return valueOf(self.wait(longest));
+          },
+          "longest"_a)
+      .def("end", &LatchHandle::end);
+}
 
 void bindMoves(py::module_& module) {
   py::class_<MoveHandle>(module, "MoveHandle")
@@ -440,6 +502,8 @@ void bindMachine(SessionClass& session) {
       .def("set_position_compare", &setPositionCompare, "output"_a, "axis"_a, "direction"_a,
            "cams"_a, "places"_a, "every"_a, "at_end"_a, "times"_a)
       .def("clear_position_compare", command(&Machine::clearPositionCompare), "output"_a)
+      .def("latch", &latch, "input"_a, "edge"_a, "every"_a, "axes"_a, "window"_a)
+      .def("probe", &probe, "input"_a, "positions"_a, "manner"_a, "values"_a)
       .def("outputs", &outputsOf)
       .def("inputs", &inputsOf)
       .def("figures",
@@ -488,6 +552,7 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = STEPDRIVER_VERSION;
   translateErrors();
   bindMoves(module);
+  bindLatches(module);
   SessionClass session(module, "Session");
   bindAxes(session);
   bindMachine(session);

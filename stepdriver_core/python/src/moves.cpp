@@ -1,24 +1,10 @@
 #include "moves.h"
 
-#include <chrono>
-
 #include "requests.h"
+#include "wait_time.h"
 
 namespace stepdriver::python {
-namespace {
-
 namespace py = pybind11;
-using std::chrono::nanoseconds;
-
-// A number of seconds that the clocks can't count is as long as it takes.
-nanoseconds timeOf(std::optional<double> seconds) {
-  if (!seconds) return nanoseconds::max();
-  const double count = *seconds * 1e9;
-  if (!(count < static_cast<double>(nanoseconds::max().count()))) return nanoseconds::max();
-  return count > 0.0 ? nanoseconds(static_cast<nanoseconds::rep>(count)) : nanoseconds::zero();
-}
-
-}  // namespace
 
 std::optional<axis::MoveResult> MoveHandle::result() const {
   if (!session_->isOpen()) return move_.outcome->get();
@@ -29,7 +15,7 @@ std::optional<axis::MoveResult> MoveHandle::result() const {
 // Without a bound the machine notices if nothing can end the wait.
 std::optional<axis::MoveResult> MoveHandle::wait(std::optional<double> longest) const {
   if (!session_->isOpen()) return move_.outcome->get();
-  return session_->run([this, time = timeOf(longest)](OpenMachine& open) {
+  return session_->run([this, time = waitTimeOf(longest)](OpenMachine& open) {
     return open.machine().axis(axis_).waitFor(move_, time);
   });
 }
@@ -54,7 +40,7 @@ std::optional<machine::CoordinatedResult> CoordinatedMoveHandle::result() const 
 std::optional<machine::CoordinatedResult> CoordinatedMoveHandle::wait(
     std::optional<double> longest) const {
   if (!session_->isOpen()) return result();
-  return session_->run([this, time = timeOf(longest)](OpenMachine& open) {
+  return session_->run([this, time = waitTimeOf(longest)](OpenMachine& open) {
     return open.machine().waitFor(move_, time);
   });
 }

@@ -44,6 +44,20 @@ const char* nameOf(axis::HomingEnd end) {
   return "";
 }
 
+const char* nameOf(machine::ProbeEnd end) {
+  switch (end) {
+    case machine::ProbeEnd::kContact:
+      return "contact";
+    case machine::ProbeEnd::kNoContact:
+      return "no_contact";
+    case machine::ProbeEnd::kCancelled:
+      return "cancelled";
+    case machine::ProbeEnd::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
 // [s] On the clock of the machine.
 std::optional<double> secondsOf(const std::optional<pulse::Nanoseconds>& time) {
   if (!time) return {};
@@ -141,6 +155,29 @@ py::dict valueOf(const machine::OutputState& output) {
 py::dict valueOf(const machine::InputState& input) {
   return py::dict("active"_a = input.active, "changed"_a = secondsOf(input.changed),
                   "error"_a = input.error);
+}
+
+py::dict valueOf(const machine::LatchedEdge& edge) {
+  py::dict positions;
+  py::dict valid;
+  for (const machine::LatchedAxis& axis : edge.axes) {
+    positions[py::str(axis.name)] = axis.position;
+    valid[py::str(axis.name)] = axis.position_valid;
+  }
+  return py::dict("number"_a = edge.number, "active"_a = edge.active,
+                  "time"_a = static_cast<double>(edge.time) * 1e-9, "positions"_a = positions,
+                  "valid"_a = valid);
+}
+
+py::dict valueOf(const machine::LatchResult& result) {
+  return py::dict("latched"_a = result.latched, "message"_a = result.message,
+                  "edge"_a = valueOf(result.edge), "edges"_a = result.edges);
+}
+
+py::dict valueOf(const machine::ProbeResult& result) {
+  return py::dict("end"_a = nameOf(result.end), "succeeded"_a = result.succeeded,
+                  "message"_a = result.message, "contact"_a = result.contact,
+                  "positions"_a = result.positions);
 }
 
 py::dict valueOf(const machine::EngineFigures& figures) {

@@ -4,7 +4,9 @@
 
 #include "stepdriver_core/axis/axis_state.h"
 #include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/latch.h"
 #include "stepdriver_core/machine/machine.h"
+#include "stepdriver_core/machine/probe.h"
 #include "stepdriver_core/sim/rig.h"
 
 /// The core's values for Python: each as a dict whose keys are the fields of the Python class that
@@ -22,6 +24,9 @@ pybind11::dict valueOf(const motion::PathAhead& ahead);
 pybind11::dict valueOf(const machine::EngineFigures& figures);
 pybind11::dict valueOf(const machine::OutputState& output);
 pybind11::dict valueOf(const machine::InputState& input);
+pybind11::dict valueOf(const machine::LatchedEdge& edge);
+pybind11::dict valueOf(const machine::LatchResult& result);
+pybind11::dict valueOf(const machine::ProbeResult& result);
 pybind11::dict valueOf(const sim::RigAxisReport& report);
 
 /// None if there is none.

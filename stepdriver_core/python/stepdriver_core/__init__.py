@@ -19,6 +19,7 @@ from ._errors import (
     ConfigIssue,
     Error,
     GpioError,
+    NoContact,
     NoSuchAxis,
     NotHomed,
     NotReached,
@@ -26,6 +27,7 @@ from ._errors import (
     StateFileError,
     Timeout,
 )
+from ._latches import Latch
 from ._machine import Machine, Rig
 from ._moves import CoordinatedMove, Move
 from ._paths import PathSegment, Segment, arc_around, arc_through, bezier, line
@@ -39,11 +41,15 @@ from ._states import (
     HomingEnd,
     HomingResult,
     InputState,
+    LatchedEdge,
+    LatchResult,
     Limits,
     MoveEnd,
     MoveResult,
     OutputState,
     PathAhead,
+    ProbeEnd,
+    ProbeResult,
     RigReport,
 )
 
@@ -62,12 +68,16 @@ __all__ = [
     "HomingEnd",
     "HomingResult",
     "InputState",
+    "Latch",
+    "LatchResult",
+    "LatchedEdge",
     "Limits",
     "Machine",
     "Motion",
     "Move",
     "MoveEnd",
     "MoveResult",
+    "NoContact",
     "NoSuchAxis",
     "NotHomed",
     "NotReached",
@@ -77,6 +87,8 @@ __all__ = [
     "PathSegment",
     "Piece",
     "Plan",
+    "ProbeEnd",
+    "ProbeResult",
     "Refused",
     "Rig",
     "RigReport",

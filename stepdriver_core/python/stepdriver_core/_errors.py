@@ -6,7 +6,7 @@ import typing
 from typing import NamedTuple, Tuple
 
 if typing.TYPE_CHECKING:
-    from ._states import CoordinatedResult, HomingResult, MoveResult
+    from ._states import CoordinatedResult, HomingResult, MoveResult, ProbeResult
 
 
 class Error(Exception):
@@ -56,7 +56,7 @@ class ConfigError(Error):
 
 
 class Timeout(Error, TimeoutError):
-    """A move hasn't ended in the time that wait() was given. The move continues."""
+    """A move or a latch hasn't ended in the time that wait() was given. It continues."""
 
 
 class NotReached(Error):
@@ -81,3 +81,15 @@ class NotHomed(Error):
     def results(self) -> Tuple[HomingResult, ...]:
         """How the homing of each axis ended, in that order."""
         return typing.cast("Tuple[HomingResult, ...]", self.args[1])
+
+
+class NoContact(Error):
+    """A probing that had to find a contact found none, or something ended it: the text says what."""
+
+    def __init__(self, text: str, result: ProbeResult) -> None:
+        super().__init__(text, result)
+
+    @property
+    def result(self) -> ProbeResult:
+        """How the probing ended, and where the axes stand."""
+        return typing.cast("ProbeResult", self.args[1])

@@ -9,10 +9,21 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Seque
 
 from . import _core
 from ._axis import Axis, _homing_result
-from ._errors import NoSuchAxis, NotHomed
+from ._errors import NoContact, NoSuchAxis, NotHomed
+from ._latches import Latch
 from ._moves import CoordinatedMove
 from ._paths import Segment
-from ._states import AxisState, EngineFigures, HomingEnd, HomingResult, InputState, OutputState, RigReport
+from ._states import (
+    AxisState,
+    EngineFigures,
+    HomingEnd,
+    HomingResult,
+    InputState,
+    OutputState,
+    ProbeEnd,
+    ProbeResult,
+    RigReport,
+)
 
 if typing.TYPE_CHECKING:
     from typing_extensions import Self
@@ -395,6 +406,71 @@ class Machine:
     def clear_position_compare(self, output: str) -> None:
         """No position switches the output any more: it goes off. Raises Refused if there is no such output."""
         self._session.clear_position_compare(output)
+
+    # ---- edges of inputs ----
+
+    def latch(
+        self,
+        input: str,
+        *,
+        edge: str = "active",
+        every: bool = False,
+        axes: Sequence[str] = (),
+        window: Optional[Tuple[str, float, float]] = None,
+    ) -> Latch:
+        """Latches the positions of axes at edges of an input with a name, by the kernel's time stamps, while they move
+        or rest. Nothing that happens to the axes ends it.
+
+        edge: those that count: to "active", to "inactive", or "either".
+        every: each edge counts until Latch.end(); False: the first one ends it.
+        axes: their names; empty: all.
+        window: edges count only while this axis is between these positions [unit]: ``("x", 0.01, 0.05)``.
+
+        Raises Refused if there is no such input or axis, or if the window is empty.
+        """
+        edges = ("active", "inactive", "either")
+        if edge not in edges:
+            raise ValueError(f"edge is {edge!r}, but must be 'active', 'inactive' or 'either'")
+        return Latch(self._session.latch(input, edge, every, list(axes), window), self._session.is_threaded)
+
+    def probe(
+        self,
+        input: str,
+        positions: Mapping[str, float],
+        *,
+        relative: bool = False,
+        away: bool = False,
+        must: bool = True,
+        velocity: Optional[float] = None,
+        second_velocity: Optional[float] = None,
+        back_off: float = 0.0,
+        go_back: bool = False,
+        check: bool = True,
+    ) -> ProbeResult:
+        """Moves axes along a straight line until an input with a name tells of a contact. They come to rest then, and
+        the result has the place of the contact, by the edge's time stamp. Returns at the end.
+
+        positions: [unit] where the line ends without a contact, by the names of the axes.
+        relative: they count from where the axes are commanded to.
+        away: the contact is where the input becomes inactive, not active.
+        must: without a contact it has failed.
+        velocity: as of move_line().
+        second_velocity: of a second touch, from ``back_off`` [unit] before the first contact; None: none.
+        go_back: at the end the axes stand at the contact, not where they came to rest.
+        check: raise NoContact if it has failed; False: return the result in any case.
+
+        Raises Refused as latch() and move_line(), and if the input tells of a contact at the start.
+        """
+        manner = {"relative": relative, "away": away, "must": must, "go_back": go_back}
+        values = {"velocity": velocity or 0.0, "second_velocity": second_velocity or 0.0, "back_off": back_off}
+        fields = self._session.probe(input, dict(positions), manner, values)
+        fields["end"] = ProbeEnd(fields["end"])
+        fields["contact"] = dict(zip(positions, fields["contact"])) if fields["contact"] else None
+        fields["positions"] = dict(zip(positions, fields["positions"]))
+        result = ProbeResult(**fields)
+        if check and not result.succeeded:
+            raise NoContact(result.message, result)
+        return result
 
     # ---- time and figures ----
 

@@ -16,7 +16,10 @@ _PATIENCE = 0.05
 
 
 def _await(
-    wait: Callable[[Optional[float]], Optional[Dict[str, Any]]], threaded: bool, timeout: Optional[float]
+    wait: Callable[[Optional[float]], Optional[Dict[str, Any]]],
+    threaded: bool,
+    timeout: Optional[float],
+    what: str = "the move",
 ) -> Dict[str, Any]:
     if timeout is not None and math.isnan(timeout):
         raise ValueError("the timeout isn't a number")
@@ -30,7 +33,7 @@ def _await(
             if result is not None or time.monotonic() >= end:
                 break
     if result is None:
-        raise Timeout(f"the move hasn't ended in {timeout:g} s; it continues")
+        raise Timeout(f"{what} hasn't ended in {timeout:g} s; it continues")
     return result
 
 

@@ -231,6 +231,60 @@ class InputState:
 
 
 @dataclass(frozen=True)
+class LatchedEdge:
+    """An edge of an input, and where the axes were then."""
+
+    number: int
+    """Of the edges of this latch, from 1 on."""
+    active: bool
+    """The input became active; False: inactive."""
+    time: float
+    """[s] on the clock of ``Machine.time``, by the kernel's time stamp of the edge."""
+    positions: Dict[str, float]
+    """[m or rad] of the axes at that time, by their names."""
+    valid: Dict[str, bool]
+    """Whether each of them could be trusted."""
+
+
+@dataclass(frozen=True)
+class LatchResult:
+    """How a latch ended."""
+
+    latched: bool
+    """There was an edge."""
+    message: str
+    """A sentence that says how it ended."""
+    edge: Optional[LatchedEdge]
+    """The last edge."""
+    edges: int
+    """How many there were."""
+
+
+class ProbeEnd(str, enum.Enum):
+    """How a probing ended. A member compares equal to its text."""
+
+    CONTACT = "contact"
+    NO_CONTACT = "no_contact"
+    CANCELLED = "cancelled"
+    FAILED = "failed"  # something else ended it: a stop, a fault, an endstop, another command
+
+
+@dataclass(frozen=True)
+class ProbeResult:
+    """What a probing has found."""
+
+    end: ProbeEnd
+    succeeded: bool
+    """There was a contact, or it need not be."""
+    message: str
+    """A sentence that says how it ended."""
+    contact: Optional[Dict[str, float]]
+    """[m or rad] where the axes were at the last contact, by their names; None: there was none."""
+    positions: Dict[str, float]
+    """[m or rad] where they stand."""
+
+
+@dataclass(frozen=True)
 class EngineFigures:
     """What the pulse engine has done since the start."""
 

@@ -332,7 +332,7 @@ PinsStep::Writes ChangeMicrosteps::writes() {
     writes.sequence = axis.motor.pins().mode(axis.motor.microsteps(), wanted_);
   }
   writes.scale = pulse::Command::Scale{change.count, axis.takenUpIn(wanted_, axis.takenUp()),
-                                       axis.exactBacklash(wanted_)};
+                                       axis.exactBacklash(wanted_), axis.switchRelease(wanted_)};
   writes.then = [&axis, change, origin] {
     if (motor::TmcChip* chip = axis.motor.tmcAt(0)) {
       chip->audit().begin(chip->mscnt(), change.count);
@@ -354,7 +354,7 @@ Steps RestorePosition::plan() {
           writes.scale =
               pulse::Command::Scale{axis.motor.state().count,
                                     axis.takenUpIn(microsteps, kept_.slack / axis.config.backlash),
-                                    axis.exactBacklash(microsteps)};
+                                    axis.exactBacklash(microsteps), axis.switchRelease(microsteps)};
           return writes;
         }));
   }

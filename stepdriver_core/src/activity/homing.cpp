@@ -74,11 +74,13 @@ void Homing::refuseUnlessReady(const axis::AxisModel& axis) {
   if (!axis.config.homing) axis.refuse("homing isn't configured: homing/switch is missing");
   axis.refuseUnlessReady();
   axis.refuseWhileHeld();
+  axis.refuseHomingOnSharedSwitch();
 }
 
 void Homing::onBegin(std::vector<Predecessor> /*predecessors*/) {
   was_homed_ = axis_.position.isHomed();
   axis_.position.beginHoming();
+  axis_.is_being_homed = true;
   deadline_ = context().now + nanoseconds(config_.timeout);
   waking_ = wakeSteps(context(), axis_);
   try {
@@ -169,7 +171,10 @@ void Homing::step() {
   }
   if (phase_ != HomingPhase::kNone) observe();
   if (isHeld()) return;
-  if (phase_ == HomingPhase::kNone) return start();
+  if (phase_ == HomingPhase::kNone) {
+    axis_.refuseHomingOnSharedSwitch();
+    return start();
+  }
   if (context().now >= deadline_) return failNow(timeOver());
   if (stroke_ != nullptr && ended) {
     if (stroke_->failure()) throw Refused(stroke_->failure()->text);
@@ -236,6 +241,7 @@ void Homing::succeed(double trigger, double skew, const std::string& remark) {
 
 void Homing::conclude(const std::string& message, bool stands) {
   phase_ = HomingPhase::kNone;
+  axis_.is_being_homed = false;
   stroke_.reset();
   result_.axis = axis_.name();
   result_.position = axis_.positionNow();

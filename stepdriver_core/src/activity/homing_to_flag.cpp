@@ -22,7 +22,7 @@ constexpr int kMostFlagDebounces = 50;
 constexpr pulse::Nanoseconds kIndexLookPeriod = 10'000'000;
 // A kernel loses edges when its queue of events overflows, which is rare. One that reports none
 // has no interrupt for this line.
-constexpr int kMostApproaches = 3;
+constexpr int kMostFlagApproaches = 3;
 
 using axis::HomingPhase;
 
@@ -49,7 +49,7 @@ void HomingToFlag::start() {
   if (flag_.error() != 0) axis_.readInput(flag_.line());
   if (flag_.active()) return seek(HomingPhase::kLeaving, -towards_);
   if (!has_flag_) return seek(HomingPhase::kLatching, towards_);
-  if (axis_.config.hasEndstop(config_.at_max) && axis_.anyEndstopActive(config_.at_max)) {
+  if (axis_.isStoppedAt(config_.at_max)) {
     returns_ = true;
     return seek(HomingPhase::kBackingOff, -towards_);
   }
@@ -164,7 +164,8 @@ void HomingToFlag::metEndstop(bool at_max) {
   if (phase() == HomingPhase::kBackingOff && !ahead && returns_ && passed_.empty()) {
     return failNow(fmt::format("{}, and {} didn't become active between the two", where, sensor()));
   }
-  failNow(fmt::format("{} while {}", where, nameOf(phase())));
+  const std::string cause = phase() == HomingPhase::kPullingOff ? "" : ": " + unmet();
+  failNow(fmt::format("{} while {}{}", where, nameOf(phase()), cause));
 }
 
 void HomingToFlag::settled() {
@@ -229,11 +230,11 @@ bool HomingToFlag::edgeWasLost() const {
 }
 
 void HomingToFlag::approachAgain() {
-  if (++approaches_ == kMostApproaches) {
+  if (++approaches_ == kMostFlagApproaches) {
     return failNow(
         fmt::format("the kernel has reported no edge of {} when it changed, in {} approaches: "
                     "its place is only known to the time between two readings",
-                    sensor(), kMostApproaches));
+                    sensor(), kMostFlagApproaches));
   }
   edge_.reset();
   centre_.clear();

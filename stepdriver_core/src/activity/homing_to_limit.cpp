@@ -95,6 +95,10 @@ void HomingToLimit::strokeEnded() {
       config_.at_max ? axis::MoveEnd::kEndstopMax : axis::MoveEnd::kEndstopMin;
   if (end == axis::MoveEnd::kReached || end == axis::MoveEnd::kStopped) return reachedEnd();
   if (end != own) {
+    const pulse::AxisEnd home = config_.at_max ? pulse::AxisEnd::kMax : pulse::AxisEnd::kMin;
+    if (axis_.config.switch_release > 0.0 && axis_.motor.state().pressed == home) {
+      return failNow(axis_.metText(!config_.at_max) + " while " + nameOf(phase()));
+    }
     return failNow(fmt::format("the {} endstop was met while {}", config_.at_max ? "min" : "max",
                                nameOf(phase())));
   }

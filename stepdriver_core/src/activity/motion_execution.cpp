@@ -61,9 +61,9 @@ std::pair<axis::MoveEnd, std::string> endOf(const axis::AxisModel& axis, const G
       if (!left_by.text.empty()) return {left_by.end, left_by.text};
       return {left_by.end, "its motion ended before its target"};
     case pulse::EndReason::kEndstopMin:
-      return {axis::MoveEnd::kEndstopMin, "the min endstop was met"};
+      return {axis::MoveEnd::kEndstopMin, axis.metText(false)};
     case pulse::EndReason::kEndstopMax:
-      return {axis::MoveEnd::kEndstopMax, "the max endstop was met"};
+      return {axis::MoveEnd::kEndstopMax, axis.metText(true)};
     case pulse::EndReason::kEmergencyStop:
       return {axis::MoveEnd::kEmergencyStop, faultThatEnded(axis)};
     case pulse::EndReason::kChipFault:

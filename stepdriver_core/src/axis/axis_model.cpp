@@ -214,6 +214,10 @@ void AxisModel::refuseUnlessReady() const {
   if (!motor.power().wantsEnabled()) refuse("disabled; enable it first");
   if (motor.power().wantsSleep()) refuse("asleep; wake it first");
   if (sharerAtFault() != nullptr) refuse(faultText() + "; call recover first");
+  for (const AxisModel* sharer : switch_sharers_) {
+    if (!sharer->is_being_homed) continue;
+    refuse(sharer->name() + ", which has a switch on the same line, is being homed: wait for it");
+  }
   for (const AxisModel* sharer : sharers_) {
     const motor::Power& power = sharer->motor.power();
     const char* const why = !power.wantsEnabled() ? "disabled; enable it first"
@@ -246,12 +250,51 @@ double AxisModel::checkedVelocity(double velocity) const {
 }
 
 void AxisModel::refuseIntoEndstop(std::int64_t steps) const {
-  if (steps > 0 && anyEndstopActive(true)) {
-    refuse("the max endstop is active; it moves only towards min");
+  if (steps == 0 || !isStoppedAt(steps > 0)) return;
+  if (config.switch_release > 0.0 && !motor.state().pressed) {
+    refuse(
+        "the switch of both ends is pressed, and it isn't known at which one; move the axis off it "
+        "by hand, while its motor has no current");
   }
-  if (steps < 0 && anyEndstopActive(false)) {
-    refuse("the min endstop is active; it moves only towards max");
+  refuse(fmt::format("{} is active; it moves only towards {}", endstopText(steps > 0),
+                     steps > 0 ? "min" : "max"));
+}
+
+void AxisModel::refuseHomingOnSharedSwitch() const {
+  if (config.homing->kind == config::HomingKind::kDirect) return;
+  for (const bool at_max : {false, true}) {
+    const AxisModel* const other = sharerOfSwitch(at_max);
+    if (other == nullptr || !anyEndstopActive(at_max)) continue;
+    refuse(
+        fmt::format("the switch that it shares with {} is pressed, and it isn't known by which "
+                    "of them: first move the one off it that presses it",
+                    other->name()));
   }
+  if (config.switch_release == 0.0 || !anyEndstopActive(false)) return;
+  const bool at_max = config.homing->at_max;
+  if (!motor.state().pressed) refuseIntoEndstop(at_max ? 1 : -1);
+  if (config.homing->kind != config::HomingKind::kLimit || isStoppedAt(at_max)) return;
+  refuse(
+      fmt::format("the switch of both ends is pressed at {}, and not where it is homed: first "
+                  "move it off",
+                  at_max ? "min" : "max"));
+}
+
+const AxisModel* AxisModel::sharerOfSwitch(bool at_max) const {
+  const motor::MotorLines& own = motor.lines();
+  const int line = at_max ? own.endstop_max : own.endstop_min;
+  const auto sharer =
+      std::find_if(switch_sharers_.begin(), switch_sharers_.end(), [line](const AxisModel* other) {
+        const motor::MotorLines& others = other->motor.lines();
+        return others.endstop_min == line || others.endstop_max == line;
+      });
+  return line >= 0 && sharer != switch_sharers_.end() ? *sharer : nullptr;
+}
+
+std::string AxisModel::endstopText(bool at_max) const {
+  const std::string text = at_max ? "the max endstop" : "the min endstop";
+  const AxisModel* const sharer = sharerOfSwitch(at_max);
+  return sharer != nullptr ? text + ", or that of " + sharer->name() + " on the same line," : text;
 }
 
 void AxisModel::refuseMicrosteps(int wanted) const {
@@ -304,6 +347,13 @@ bool AxisModel::anyEndstopActive(bool at_max) const {
     if (endstopActive(i, at_max).value_or(false)) return true;
   }
   return false;
+}
+
+bool AxisModel::isStoppedAt(bool at_max) const {
+  if (!anyEndstopActive(at_max)) return false;
+  const auto pressed = motor.state().pressed;
+  const auto end = at_max ? pulse::AxisEnd::kMax : pulse::AxisEnd::kMin;
+  return config.switch_release == 0.0 || !pressed || *pressed == end;
 }
 
 std::string AxisModel::chipText(std::size_t motor_index) const {
@@ -424,8 +474,16 @@ void AxisModel::distrust() {
 
 void AxisModel::noteEndstop(bool at_max) {
   ++endstops_met;
-  stopped_by = fmt::format("the {} endstop was met at {}{}", at_max ? "max" : "min",
-                           showPlace(positionNow()), abruptText());
+  stopped_by = metText(at_max) + " at " + showPlace(positionNow()) + abruptText();
+}
+
+std::string AxisModel::metText(bool at_max) const {
+  const auto pressed = motor.state().pressed;
+  const auto end = at_max ? pulse::AxisEnd::kMax : pulse::AxisEnd::kMin;
+  if (config.switch_release == 0.0 || pressed == end) return endstopText(at_max) + " was met";
+  if (!pressed) return "the switch of both ends is pressed, and it isn't known at which one,";
+  return "the switch of both ends didn't open within its release travel, " +
+         show(config.switch_release) + ",";
 }
 
 std::string AxisModel::abruptText() const {

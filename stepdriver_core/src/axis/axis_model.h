@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "axis/axis_memory.h"
@@ -44,6 +45,7 @@ class AxisModel {
   Position position;
   FlagPlaces flag_places;  ///< those of the last homing, if it was one to a flag
   Fault fault;
+  bool is_being_homed = false;
   motion::SetpointStream setpoints;
   const MachineMode& mode;
   const InputLevels& inputs;
@@ -61,6 +63,10 @@ class AxisModel {
   std::int64_t backlash() const;  ///< [microsteps] the nearest whole number of them
   /// [microsteps] The same in a mode, of which it need not be whole microsteps.
   double exactBacklash(int microsteps) const { return config.backlash * stepsPerUnit(microsteps); }
+  /// [microsteps] see config::AxisConfig
+  double switchRelease(int microsteps) const {
+    return config.switch_release * stepsPerUnit(microsteps);
+  }
   /// The part of the backlash that is taken up, at rest: from 0 to 1.
   double takenUp() const;
   /// [microsteps] The count in a mode. @param part see takenUp().
@@ -140,6 +146,9 @@ class AxisModel {
   }
   /// @param steps to make; 0 is never refused.
   void refuseIntoEndstop(std::int64_t steps) const;
+  /// Where a homing can't begin: a switch that it shares is pressed, and another axis may do it, or
+  /// its other end does.
+  void refuseHomingOnSharedSwitch() const;
   void refuseMicrosteps(int wanted) const;
   /// [unit/s] The requested velocity, or the maximum if that is 0.
   double checkedVelocity(double velocity) const;
@@ -151,6 +160,11 @@ class AxisModel {
   std::optional<bool> endstopActive(std::size_t motor_index, bool at_max) const;
   /// Whether that of any motor is. @throw GpioError
   bool anyEndstopActive(bool at_max) const;
+  /// "the min endstop", and with whom it shares its line.
+  std::string endstopText(bool at_max) const;
+  /// Whether it stops motions towards that end, at rest: not if the other end presses the switch
+  /// that both share. @throw GpioError
+  bool isStoppedAt(bool at_max) const;
   /// @throw GpioError
   int readInput(int line) const;
   /// @name The driver of a motor of the axis, or of those that it shares: its own is the first one
@@ -188,6 +202,9 @@ class AxisModel {
   /// @param axes all of them, in the order of the kinematics; they live as long as this one.
   /// @throw Refused if it has something that such an axis can't have.
   void shareMotors(const std::vector<AxisModel*>& axes);
+  /// @param axes that have a switch on a line of this one's, without itself.
+  void shareSwitches(std::vector<const AxisModel*> axes) { switch_sharers_ = std::move(axes); }
+  const std::vector<const AxisModel*>& switchSharers() const { return switch_sharers_; }
   /// All others that do; empty if its motors are its own.
   const std::vector<AxisModel*>& sharers() const { return sharers_; }
   /// The fault of this axis, or that of a sharer, which lets it not move either; empty if there is
@@ -214,6 +231,8 @@ class AxisModel {
 
   /// Its motion has ended at an endstop that it wasn't looking for.
   void noteEndstop(bool at_max);
+  /// Why a motion has ended at an endstop, as the begin of a sentence: "the min endstop was met".
+  std::string metText(bool at_max) const;
   /// Whether its last motion ended too fast for the position to be trusted, as the end of a
   /// sentence; empty if it didn't.
   std::string abruptText() const;
@@ -266,8 +285,12 @@ class AxisModel {
   /// share its motors: its driver has registers, or lines switch its coils.
   void forEachPlaced(const std::function<void(const motor::Motor& any, std::size_t i)>& act) const;
 
+  /// nullptr: no other axis has a switch on the line of this one.
+  const AxisModel* sharerOfSwitch(bool at_max) const;
+
   std::vector<AxisModel*> sharing_;  // in the order of the kinematics
   std::vector<AxisModel*> sharers_;  // without itself
+  std::vector<const AxisModel*> switch_sharers_;
   double reach_ = 0.0;
   AxisMemory rest_;  // when it was last at rest
   AxisLimits limits_;

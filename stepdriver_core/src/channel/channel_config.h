@@ -36,6 +36,9 @@ struct MotorSignals {
   std::array<Signal, kCoils> coils;  ///< see ChannelConfig::patterns
 };
 
+/// An end of an axis.
+enum class AxisEnd : std::uint8_t { kMin, kMax };
+
 /// The most motors that an axis can have.
 constexpr std::size_t kMostMotors = 4;
 
@@ -80,6 +83,10 @@ struct ChannelConfig : MotorSignals {
   std::optional<Signal> block;
   /// The fault outputs are such inputs. In these motions that is no fault.
   bool block_is_fault = false;
+  /// [microsteps] If endstop_min and endstop_max are one line, which doesn't tell the end that
+  /// presses it: the way on which the switch opens for certain. 0: they aren't.
+  double switch_release = 0.0;
+  std::optional<AxisEnd> assumed_end;  ///< the one that presses that switch if nothing tells
   Nanoseconds in_position_timeout = 0;
   /// `step` makes steps forward, and pulses on `dir`, which is no level then, make steps backward.
   /// dir_setup and dir_hold are kept between the pulses of the two.

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "channel/channel_config.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -49,7 +50,10 @@ struct ChannelState {
   LineFailure failure;       ///< the last one
   Nanoseconds end_time = 0;  ///< motion time at which it ended
   bool end_abrupt = false;   ///< it ended at a speed that the motor can't stop from at once
-  MotorSet still = 0;        ///< the motors that make no steps in this motion, or the last one
+  /// At rest: the end that presses the switch that both ends share, if it is active. Empty: it
+  /// isn't known.
+  std::optional<AxisEnd> pressed;
+  MotorSet still = 0;  ///< the motors that make no steps in this motion, or the last one
   std::uint8_t chip_at_fault = 0;  ///< the motor whose chip has reported the last of chip_faults
   std::uint8_t unsettled = 0;      ///< the motor that kNotInPosition is about
   Nanoseconds waited = 0;  ///< how long it waited for the in-position output before kNotInPosition

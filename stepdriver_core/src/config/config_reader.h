@@ -169,7 +169,9 @@ void checkAxisName(const std::string& name, ConfigReader& axis);
 ///     max_position_mm: 200.0
 ///     endstops:                 # both optional
 ///       min: {pin: "gpiochip0:20", active_level: low}   # low or high
-///       max: {pin: "gpiochip0:21", active_level: low}
+///       max: {pin: "gpiochip0:21", active_level: low, shared: false}  # true: also others' line
+///       release_mm: 2.0         # only if both share one line: on this way it opens for certain
+///       assumed_end: min        # the end that presses it if nothing tells; default: refused then
 ///     motors:                   # 2 to 4 that step together, in place of pins and endstops above:
 ///       left: {pins: ..., endstops: ..., offset_mm: 0.0}  # and all keys about them; and driver,
 ///                               # chip and timing, if they aren't those of the axis

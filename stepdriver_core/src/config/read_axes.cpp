@@ -19,6 +19,7 @@
 #include "read_pins.h"
 #include "read_power.h"
 #include "read_shaper.h"
+#include "read_shared_switches.h"
 
 namespace stepdriver::config {
 namespace {
@@ -112,6 +113,7 @@ class AxesReader {
     readBrake(axis, pins_are_right, config, used_);
     const std::optional<Kind> kind = readMotion(axis, context, config);
     readSpeedsOfChips(axis, config);
+    readSharedEnds(axis, kind, config);
     readShaper(axis, kind, config);
     readHoming(axis, kind, config);
     readSquaring(axis, kind, config);
@@ -186,6 +188,7 @@ std::vector<AxisConfig> readAxes(const ConfigValue& axes, const std::string& nam
   for (const std::string& key : axes.orderedKeys()) {
     configs.push_back(each.read(key, reader.map(key)));
   }
+  checkSharedSwitches(configs, name, issues);
   return configs;
 }
 

@@ -222,7 +222,7 @@ void readMotors(ConfigReader& axis, const std::vector<MotorChip>& chips, AxisCon
     motor.tmc = chips.at(number).tmc;
     reader.allow("tmc");
     readPins(reader, chip ? &*chip : nullptr, motor, used);
-    readEndstops(reader, motor, used);
+    readEndstops(reader, !axis.has("motors"), motor, used);
   };
   if (!axis.has("motors")) return read(axis, 0, config);
   for (const char* key : kMotorKeys) {

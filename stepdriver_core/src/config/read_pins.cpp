@@ -398,11 +398,22 @@ std::string readRequiredLine(ConfigReader& reader, const std::string& key, UsedL
   return readLine(reader, key, Presence::kRequired, used).value_or("");
 }
 
-InputSwitch readInputSwitch(ConfigReader& reader, UsedLines& used) {
+namespace {
+
+/// All but its line.
+InputSwitch readLevel(ConfigReader& reader) {
   InputSwitch input;
-  input.line = readRequiredLine(reader, "pin", used);
   input.active_level = reader.oneOf("active_level", {"low", "high"}) == "high";
   input.bias = readBias(reader, "bias");
+  return input;
+}
+
+}  // namespace
+
+InputSwitch readInputSwitch(ConfigReader& reader, UsedLines& used) {
+  std::string line = readRequiredLine(reader, "pin", used);
+  InputSwitch input = readLevel(reader);
+  input.line = std::move(line);
   return input;
 }
 
@@ -429,18 +440,27 @@ void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, Used
                            axis.fullName("pins/enable"), axis.fullName("pins/sleep")));
 }
 
-void readEndstops(ConfigReader& axis, MotorConfig& config, UsedLines& used) {
+void readEndstops(ConfigReader& axis, bool is_only, MotorConfig& config, UsedLines& used) {
   ConfigReader endstops = axis.map("endstops");
   const auto read = [&](const char* end) -> std::optional<Endstop> {
     ConfigReader reader = endstops.map(end);
     if (!endstops.has(end)) return {};
-    const Endstop endstop = readInputSwitch(reader, used);
+    Endstop endstop;
+    endstop.shared = reader.boolean("shared", false);
+    if (endstop.shared) {
+      std::string line = readLineName(reader, "pin", Presence::kRequired).value_or("");
+      static_cast<InputSwitch&>(endstop) = readLevel(reader);
+      endstop.line = std::move(line);
+      if (!endstop.line.empty()) used.addShared(reader.fullName("pin"), endstop);
+    } else {
+      static_cast<InputSwitch&>(endstop) = readInputSwitch(reader, used);
+    }
     reader.rejectUnknown();
     return endstop;
   };
   config.endstop_min = read("min");
   config.endstop_max = read("max");
-  endstops.rejectUnknown();
+  if (!is_only) endstops.rejectUnknown();
 }
 
 }  // namespace stepdriver::config

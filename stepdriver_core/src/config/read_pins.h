@@ -26,7 +26,9 @@ void readPins(ConfigReader& axis, const driver::DriverChip* chip, MotorConfig& c
 /// @param pins_are_right false: the pins that it depends on have issues, and aren't checked again.
 void readBrake(ConfigReader& axis, bool pins_are_right, AxisConfig& config, UsedLines& used);
 
-/// Reads `endstops`.
-void readEndstops(ConfigReader& axis, MotorConfig& config, UsedLines& used);
+/// Reads the switches of `endstops`.
+///
+/// @param is_only the axis has no other motor: readSharedEnds() reads the rest.
+void readEndstops(ConfigReader& axis, bool is_only, MotorConfig& config, UsedLines& used);
 
 }  // namespace stepdriver::config

@@ -23,11 +23,28 @@ void UsedLines::addEnable(const std::string& key, const std::string& line, std::
                      true});
 }
 
+void UsedLines::addShared(const std::string& key, const Endstop& endstop) {
+  const auto [found, is_new] =
+      users_.emplace(endstop.line, User{key, false, std::nullopt, endstop});
+  if (is_new) return;
+  const User& user = found->second;
+  if (!user.shared) return refuse(key, endstop.line, user);
+  if (user.shared->active_level == endstop.active_level && user.shared->bias == endstop.bias) {
+    return;
+  }
+  issues_.push_back({key,
+                     fmt::format("is \"{}\", which is {} too; switches that share a line need the "
+                                 "same active_level and bias",
+                                 endstop.line, user.key),
+                     true});
+}
+
 void UsedLines::refuse(const std::string& key, const std::string& line, const User& user) {
   issues_.push_back({key,
                      fmt::format("is \"{}\", which is used twice: it is {} already, "
-                                 "and each pin needs a line of its own",
-                                 line, user.key),
+                                 "and each pin needs a line of its own{}",
+                                 line, user.key,
+                                 user.shared ? ", unless both are switches with shared: true" : ""),
                      true});
 }
 

@@ -5,11 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::config {
 
-/// The lines of the whole configuration: each may serve only one purpose, except ENABLE lines.
+/// The lines of the whole configuration: each may serve only one purpose, except ENABLE lines, and
+/// those of switches that share one.
 class UsedLines {
  public:
   /// @param issues a line with two purposes is reported here; outlives this.
@@ -23,6 +25,11 @@ class UsedLines {
   /// @param on that level; empty if it isn't known.
   void addEnable(const std::string& key, const std::string& line, std::optional<bool> on);
 
+  /// The line of a switch that others may share, if they are active at the same level.
+  ///
+  /// @param endstop is shared.
+  void addShared(const std::string& key, const Endstop& endstop);
+
   /// Calls this for each line, with the key that has named it first.
   template <typename Use>
   void forEach(const Use& use) const {
@@ -34,6 +41,7 @@ class UsedLines {
     std::string key;
     bool enables = false;
     std::optional<bool> on{};
+    std::optional<Endstop> shared{};
   };
 
   void refuse(const std::string& key, const std::string& line, const User& user);

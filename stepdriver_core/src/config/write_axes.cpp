@@ -79,9 +79,24 @@ class AxisWriter {
     if (motor.tmc) map["tmc"] = writeTmc(*motor.tmc, axis_);
     writePins(motor, map);
     ConfigValue::Map endstops;
-    if (motor.endstop_min) endstops["min"] = writeSwitch(*motor.endstop_min);
-    if (motor.endstop_max) endstops["max"] = writeSwitch(*motor.endstop_max);
+    if (motor.endstop_min) endstops["min"] = writeEndstop(*motor.endstop_min);
+    if (motor.endstop_max) endstops["max"] = writeEndstop(*motor.endstop_max);
+    if (axis_.motors() == 1) {
+      if (axis_.switch_release != 0.0) {
+        endstops[axis_.kind == Kind::kLinear ? "release_mm" : "release_deg"] =
+            units(axis_.switch_release);
+      }
+      if (axis_.assumed_end_is_max) {
+        endstops["assumed_end"] = *axis_.assumed_end_is_max ? "max" : "min";
+      }
+    }
     map["endstops"] = std::move(endstops);
+    return map;
+  }
+
+  static ConfigValue::Map writeEndstop(const Endstop& endstop) {
+    ConfigValue::Map map = writeSwitch(endstop);
+    map["shared"] = endstop.shared;
     return map;
   }
 

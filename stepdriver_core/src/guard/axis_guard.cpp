@@ -16,7 +16,10 @@ AxisGuard::AxisGuard(const ChannelConfig& config, ChannelState& state, WatchedLi
       lines_(lines),
       all_motors_(static_cast<MotorSet>(motorBit(motors()) - 1)),
       has_switch_(has(&MotorSignals::endstop_min) || has(&MotorSignals::endstop_max)),
-      idle_(!has_switch_ && !has(&MotorSignals::fault) && !config.block && config.twins.empty()) {}
+      idle_(!has_switch_ && !has(&MotorSignals::fault) && !config.block && config.twins.empty()),
+      shared_(config.assumed_end) {
+  state_.pressed = shared_.pressed();
+}
 
 bool AxisGuard::has(std::optional<Signal> MotorSignals::*signal) const {
   for (std::size_t i = 0; i < motors(); ++i) {
@@ -30,11 +33,20 @@ void AxisGuard::begin(const Manner& manner, Nanoseconds now) {
   until_block_ = manner.until_block;
   began_ = now;
   if (manner.is_square) square_lags_ = state_.lags;
+  shared_.begin(state_.count);
+}
+
+void AxisGuard::end() {
+  squares_ = until_block_ = settling_ = false;
+  shared_.follow(state_.count, config_.switch_release);
+  state_.pressed = shared_.pressed();
 }
 
 void AxisGuard::reserve() {
   reserved_ = true;
   faulty_ = 0;  // it must be read again when the pins have been written
+  shared_.forget();
+  state_.pressed = shared_.pressed();
 }
 
 void AxisGuard::release() {
@@ -73,7 +85,9 @@ std::optional<Objection> AxisGuard::mayStep(int direction) {
   for (std::size_t i = 0; config_.block_is_fault && faulty_ != 0 && i < motors(); ++i) {
     if ((faulty_ & motorBit(i)) != 0) readFault(i);
   }
-  if (has_switch_ && direction != 0) {
+  if (config_.switch_release > 0.0 && direction != 0) {
+    if (auto objection = readSharedSwitch(direction)) return objection;
+  } else if (has_switch_ && direction != 0) {
     for (std::size_t i = 0; i < motors(); ++i) {
       if ((state_.still & motorBit(i)) != 0) continue;
       if (auto objection = readSwitch(i, direction > 0)) return objection;
@@ -97,6 +111,17 @@ std::optional<Objection> AxisGuard::readBlock() {
                           block_edge_.load(std::memory_order_acquire) >= began_;
   if (!is_blocked) return std::nullopt;
   return Objection{EndReason::kBlocked, {}};
+}
+
+std::optional<Objection> AxisGuard::readSharedSwitch(int direction) {
+  const Signal& endstop = *config_.endstop_min;
+  const int level = lines_.read(endstop.line);
+  if (level < 0) return Objection{EndReason::kLineError, {-level, endstop.line, true}};
+  const bool is_active = (level != 0) == endstop.active;
+  if (shared_.mayStep(state_.count, direction, is_active, config_.switch_release)) {
+    return std::nullopt;
+  }
+  return Objection{direction > 0 ? EndReason::kEndstopMax : EndReason::kEndstopMin, {}};
 }
 
 // A motor that squares stops at its own switch, and the others continue.

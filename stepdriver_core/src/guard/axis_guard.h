@@ -7,6 +7,7 @@
 #include "channel/channel_config.h"
 #include "channel/channel_state.h"
 #include "channel/watched_lines.h"
+#include "shared_ends.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
@@ -40,7 +41,7 @@ class AxisGuard {
   };
   /// A motion begins from rest. @param now clock time.
   void begin(const Manner& manner, Nanoseconds now);
-  void end() { squares_ = until_block_ = settling_ = false; }
+  void end();
   /// @}
 
   /// @name Reservation, while the chip's other pins are being written
@@ -91,6 +92,7 @@ class AxisGuard {
     return number == 0 ? config_ : config_.twins[number - 1];
   }
   std::optional<Objection> readSwitch(std::size_t motor, bool forward);
+  std::optional<Objection> readSharedSwitch(int direction);
   std::optional<Objection> readBlock();
   void countFault(std::size_t motor);
   bool wouldSkew(int direction) const;
@@ -102,6 +104,7 @@ class AxisGuard {
   const MotorSet all_motors_;
   const bool has_switch_;
   const bool idle_;
+  SharedEnds shared_;
   bool squares_ = false;  // the current motion does
   bool until_block_ = false;
   Nanoseconds began_ = 0;  // clock time

@@ -36,6 +36,15 @@ constexpr pulse::Nanoseconds kPauseAfterSample = 3;  // times as long as the sam
 constexpr const char* kLostStepsRemedy =
     "check what the motor moves, its current and its acceleration, call recover, and home it";
 
+bool haveCommonSwitch(const axis::AxisModel& one, const axis::AxisModel& other) {
+  const motor::MotorLines& own = one.motor.lines();
+  const motor::MotorLines& others = other.motor.lines();
+  const auto is_on = [](int line, const motor::MotorLines& lines) {
+    return line >= 0 && (line == lines.endstop_min || line == lines.endstop_max);
+  };
+  return is_on(own.endstop_min, others) || is_on(own.endstop_max, others);
+}
+
 constexpr const char* kLateRemedy =
     "lower the axis's speed or the machine's load (stepdriver_check says what it can sustain), "
     "call "
@@ -72,6 +81,13 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
       sharing.push_back(other->get());
     }
     axis->shareMotors(sharing);
+  }
+  for (const auto& axis : context_.axes) {
+    std::vector<const axis::AxisModel*> sharing;
+    for (const auto& other : context_.axes) {
+      if (other != axis && haveCommonSwitch(*axis, *other)) sharing.push_back(other.get());
+    }
+    axis->shareSwitches(std::move(sharing));
   }
   flag_checks_ = FlagChecks(context_.axes);
   const std::vector<config::OutputConfig> outputs = requests_.named.outputs.configs();

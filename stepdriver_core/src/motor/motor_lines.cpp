@@ -53,8 +53,8 @@ class LineRequests {
     for (std::size_t i = 0; i < lines.coils.size(); ++i) {
       lines.coils[i] = output(pins.coil(i), false, keep_);
     }
-    lines.endstop_min = input(motor.endstop_min);
-    lines.endstop_max = input(motor.endstop_max);
+    lines.endstop_min = endstop(motor.endstop_min);
+    lines.endstop_max = endstop(motor.endstop_max);
     lines.fault = input(motor.fault);
     lines.in_position = input(motor.in_position);
     return lines;
@@ -71,6 +71,17 @@ class LineRequests {
     if (!pin) return -1;
     inputs_.push_back({pin->line, pin->bias, true});
     return static_cast<int>(inputs_.size()) - 1;
+  }
+
+  int endstop(const std::optional<config::Endstop>& endstop) {
+    if (endstop && endstop->shared) {
+      const auto is_same = [&](const gpio::InputRequest& other) {
+        return other.line == endstop->line;
+      };
+      const auto known = std::find_if(inputs_.begin(), inputs_.end(), is_same);
+      if (known != inputs_.end()) return static_cast<int>(known - inputs_.begin());
+    }
+    return input(endstop);
   }
 
   void addEnable(const config::MotorConfig& motor, ChipLines& lines) {
@@ -178,6 +189,10 @@ pulse::ChannelConfig channelConfig(const config::AxisConfig& config, const Motor
   channel.step_low = timing.step_low_ns;
   channel.dir_setup = timing.dir_setup_ns;
   channel.dir_hold = timing.dir_hold_ns;
+  channel.switch_release = config.switch_release * config.steps_per_unit;
+  if (config.assumed_end_is_max) {
+    channel.assumed_end = *config.assumed_end_is_max ? pulse::AxisEnd::kMax : pulse::AxisEnd::kMin;
+  }
   channel.backlash = config.backlash * config.steps_per_unit;
   channel.max_skew = motion::restingCount(config.max_skew * config.steps_per_unit);
   return channel;

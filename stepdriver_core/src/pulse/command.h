@@ -121,6 +121,7 @@ struct Command {
     std::int64_t count = 0;
     double taken_up = 0.0;  ///< the part of the backlash that is taken up, see ChannelState
     double backlash = 0.0;
+    double switch_release = 0.0;  ///< see ChannelConfig
   };
   std::optional<Scale> scale;  ///< for kRelease
   /// For kRelease, if lines switch the coils of the motors: their current from now on.

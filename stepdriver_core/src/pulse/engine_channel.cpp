@@ -126,6 +126,7 @@ void EngineChannel::release(const Command& command) {
     state.count = scale->count;
     motion->rescale(scale->count);
     config.backlash = scale->backlash;
+    config.switch_release = scale->switch_release;
     takeUp(scale->taken_up);
     ++state.epoch;
   }

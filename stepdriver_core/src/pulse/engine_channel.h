@@ -65,7 +65,9 @@ struct EngineChannel {
         config(channel_config),
         motion(&follower),
         guard(config, state, lines),
-        lane(port_lane) {}
+        lane(port_lane) {
+    published.store(state);
+  }
   EngineChannel(const EngineChannel&) = delete;
   EngineChannel& operator=(const EngineChannel&) = delete;
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <memory>
@@ -187,6 +188,48 @@ TEST_F(HomingTest, FindsTheSamePlaceFromRandomOnes) {
     EXPECT_NEAR(carriage(), 0.0, kStep);
   }
   EXPECT_EQ(violationsOf(bench->report()), "");
+}
+
+// With random bounces and hysteresis of the switch. Some of the starts are with a switch that is
+// missing or stuck.
+TEST_F(HomingTest, FromAnyPlaceFindsTheSameSwitchOrSaysWhatIsWrongWithIt) {
+  std::mt19937 random(37);
+  std::uniform_real_distribution<double> starts(-100.0, 99.0);
+  std::uniform_real_distribution<double> hysteresis(0.0, 0.8);
+  double least = 1e9;
+  double most = -1e9;
+  for (int i = 0; i < 1000; ++i) {
+    const bool is_broken = i % 20 == 19;
+    config::AxisConfig config = homingAxis();
+    if (is_broken) config.homing->max_travel = 0.1;
+    build(config, [&](sim::RigAxisSpec& spec) {
+      spec.start = std::round(starts(random) * 80.0) / 80.0;
+      spec.min_switch->hysteresis = hysteresis(random);
+      spec.min_switch->bounces = static_cast<int>(random() % 7);
+      spec.min_switch->bounce_ns = 200'000;
+      if (is_broken) spec.start = -0.5 * std::abs(spec.start);
+    });
+    const std::string what = "start " + std::to_string(i) + " at " + std::to_string(carriage());
+    sim::RigFaults faults;
+    faults.min_stuck = i / 20 % 2 == 0;
+    if (is_broken) bench->rig.setFaults("x", faults);
+    const HomingResult result = x().home();
+    ASSERT_EQ(violationsOf(bench->report()), "") << what;
+    if (is_broken) {
+      ASSERT_EQ(result.end, HomingEnd::kFailed) << what;
+      ASSERT_NE(result.message.find(*faults.min_stuck ? "the min switch didn't open"
+                                                      : "the min switch didn't close"),
+                std::string::npos)
+          << what << ": " << result.message;
+      continue;
+    }
+    ASSERT_EQ(result.end, HomingEnd::kHomed) << what << ": " << result.message;
+    const double error = (x().state().position - carriage()) / kStep;
+    least = std::min(least, error);
+    most = std::max(most, error);
+  }
+  EXPECT_LE(most - least, 1.0);
+  EXPECT_NEAR(most, 0.0, 1.0);
 }
 
 TEST_F(HomingTest, IsLostWithAHomingThatFails) {

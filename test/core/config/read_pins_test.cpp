@@ -135,13 +135,14 @@ TEST(ReadPins, KeepsCommonAnodeForTheTb6600) {
 TEST(ReadPins, ChecksTheEndstops) {
   ConfigValue axis = linearAxis();
   put(axis, "endstops/min", mapOf({{"pin", "A"}, {"active_level", "high"}}));
-  expectIssues(axis,
-               {{"endstops/min/active_level", "hihg",
-                 "is \"hihg\", but must be low or high; did you mean high?"},
-                {"endstops/min/active_level", 0, "is 0 (an integer), but must be low or high"},
-                {"endstops/min/pull", "up", "is not known; known here: active_level, bias and pin"},
-                {"endstops/mid", "A", "is not known; did you mean min?"},
-                {"endstops/max", "A", "is \"A\" (a string), but must be a map"}});
+  expectIssues(
+      axis,
+      {{"endstops/min/active_level", "hihg",
+        "is \"hihg\", but must be low or high; did you mean high?"},
+       {"endstops/min/active_level", 0, "is 0 (an integer), but must be low or high"},
+       {"endstops/min/pull", "up", "is not known; known here: active_level, bias, pin and shared"},
+       {"endstops/mid", "A", "is not known; did you mean min?"},
+       {"endstops/max", "A", "is \"A\" (a string), but must be a map"}});
   expectMissing(
       axis, {{"endstops/min/active_level", "low or high"},
              {"endstops/min/pin", "a line: chip:offset, as \"gpiochip0:17\", or a line's name"}});

@@ -286,5 +286,47 @@ TEST_F(MachineOnBoard, RecoversAnEmergencyStopInputOnTheBoard) {
   expectToMoveExactly("x", mcu_);
 }
 
+// ---- switches that share a line ----
+
+config::Endstop sharedSwitchOnBoard() {
+  config::Endstop endstop;
+  endstop.line = "mcu:gpio7";
+  endstop.shared = true;
+  return endstop;
+}
+
+template <typename Open>
+std::string whyNotOpened(const Open& open) {
+  try {
+    open();
+  } catch (const BoardError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(MachineOnBoard, RefusesASwitchOfBothEnds) {
+  config::AxisConfig x = axisOn("mcu", "x");
+  x.endstop_min = x.endstop_max = sharedSwitchOnBoard();
+  x.switch_release = 0.002;
+  EXPECT_EQ(whyNotOpened([&] { make({x}); }),
+            "Line mcu:gpio2 is on a board, which can't tell at which end a switch of both is "
+            "pressed: its ends need a line each.");
+}
+
+TEST_F(MachineOnBoard, RefusesASwitchOfSeveralAxes) {
+  config::AxisConfig x = axisOn("mcu", "x");
+  x.endstop_min = sharedSwitchOnBoard();
+  config::AxisConfig y = x;
+  y.name = y.joint = "y";
+  y.pins.step.line = "mcu:gpio10";
+  y.pins.dir.line = "mcu:gpio11";
+  EXPECT_EQ(whyNotOpened([&] {
+              make({x, y});
+            }),
+            "Line mcu:gpio7 stops the motors of several axes: on a board each needs a line of "
+            "its own.");
+}
+
 }  // namespace
 }  // namespace stepdriver::klipper

@@ -102,9 +102,9 @@ TEST_P(ShippedConfiguration, ReachesTheEndsOfStraightLinesAfterItsHoming) {
 INSTANTIATE_TEST_SUITE_P(Shipped, ShippedConfiguration,
                          testing::Values("a4988.yaml", "board.yaml", "camera.yaml", "corexy.yaml",
                                          "drv8825.yaml", "gantry.yaml", "pen_plotter.yaml",
-                                         "plotter.yaml", "rotary_axis.yaml", "tb6600.yaml",
-                                         "tmc2209.yaml", "tmc5160.yaml", "two_axes.yaml",
-                                         "uln2003.yaml", "wheel.yaml"));
+                                         "plotter.yaml", "rotary_axis.yaml", "shared_switch.yaml",
+                                         "tb6600.yaml", "tmc2209.yaml", "tmc5160.yaml",
+                                         "two_axes.yaml", "uln2003.yaml", "wheel.yaml"));
 
 }  // namespace
 }  // namespace stepdriver::yaml

@@ -74,7 +74,11 @@ struct InputSwitch {
 };
 
 /// A switch at one end of an axis.
-using Endstop = InputSwitch;
+struct Endstop : InputSwitch {
+  /// Its line is also that of the other end, or of ends of other axes: it is active while any of
+  /// these switches is pressed.
+  bool shared = false;
+};
 
 /// The driver's fault or alarm output, such as nFAULT: an open drain that is pulled low at
 /// over-current or over-temperature.
@@ -251,6 +255,14 @@ struct AxisConfig : MotorConfig {
 
   /// ENABLE or SLEEP is wired if there is a brake.
   std::optional<BrakeConfig> brake;
+
+  /// [unit] If both its ends share one line: the way on which the switch opens for certain, from
+  /// wherever it is pressed. It must be longer than the hysteresis of the switch, and shorter than
+  /// half of the way between the ends. 0: they don't.
+  double switch_release = 0.0;
+  /// The end that presses that switch if nothing tells, as after the start: true: max; false: min.
+  /// Empty: then the axis is refused all motions until it was moved off by hand.
+  std::optional<bool> assumed_end_is_max;
 
   std::optional<HomingConfig> homing;
   /// [unit] How far the motors may get apart while a homing squares them.

@@ -19,6 +19,10 @@ void Home::serve(RequestContext& machine, const SharedCall& call) const {
     activity::Homing::refuseUnlessReady(homed);
     machine.refuseUnlessReadyToMove(homed);
     machine.refuseUnlessFree(homed, "it is homed");
+    for (const axis::AxisModel* sharer : homed.switchSharers()) {
+      machine.refuseUnlessFree(*sharer,
+                               homed.name() + ", which has a switch on the same line, is homed");
+    }
   }
   if (only_check) return;
   for (const AxisId id : axes) {

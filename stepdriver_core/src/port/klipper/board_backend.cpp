@@ -314,6 +314,11 @@ class BoardBackend::HeldLines final : public gpio::Lines {
       }
       addMotor(twin, i + 1, board, channel, steps);
     }
+    if (lane.switch_release > 0.0) {
+      refuse(step.name,
+             "is on a board, which can't tell at which end a switch of both is pressed: "
+             "its ends need a line each");
+    }
     addSwitch(lane.endstop_min, pulse::EndReason::kEndstopMin, -1, 0, board, channel);
     addSwitch(lane.endstop_max, pulse::EndReason::kEndstopMax, 1, 0, board, channel);
     if (lane.ramps_at_fault) {
@@ -345,6 +350,10 @@ class BoardBackend::HeldLines final : public gpio::Lines {
     if (input.board != &board) {
       refuse(input.name,
              fmt::format("stops a motor of the board {}: it must be on that board", board.name()));
+    }
+    if (!switches_.insert(signal->line).second) {
+      refuse(input.name,
+             "stops the motors of several axes: on a board each needs a line of its own");
     }
     channel.switches.push_back({endstopOf(signal->line), signal->active, reason, direction, motor});
   }
@@ -395,6 +404,7 @@ class BoardBackend::HeldLines final : public gpio::Lines {
   std::vector<Output> outputs_;
   std::vector<std::unique_ptr<Input>> inputs_;
   std::vector<int> base_inputs_;
+  std::set<int> switches_;  // inputs that stop motors
   std::unique_ptr<gpio::Lines> base_;
   gpio::EdgeQueue edges_;
   std::mutex writers_;
