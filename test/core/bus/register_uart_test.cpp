@@ -166,8 +166,8 @@ INSTANTIATE_TEST_SUITE_P(, RegisterUartInNoise,
                          ::testing::Values(Noise{"LostBytes", {0.01, 0.0, 0.0, false}},
                                            Noise{"DoubledBytes", {0.0, 0.01, 0.0, false}},
                                            Noise{"FlippedBits", {0.0, 0.0, 0.01, false}},
-                                           Noise{"LateBytes", {0.0, 0.0, 0.0, false, 0.01}},
-                                           Noise{"All", {0.01, 0.01, 0.02, false, 0.01}}),
+                                           Noise{"LateBytes", {0.0, 0.0, 0.0, false, false, 0.01}},
+                                           Noise{"All", {0.01, 0.01, 0.02, false, false, 0.01}}),
                          [](const auto& noise) { return noise.param.name; });
 
 TEST(RegisterJob, ReadsBackWhatItWrites) {
