@@ -106,13 +106,19 @@ class JerkLimitedSection {
     return 2.0 * slowest < std::min(fastest, std::cbrt(length * length * jerk / 4.0));
   }
 
-  Plan fastest() {
+  /// The fastest of some averages.
+  Plan average() {
+    return onThePath([this] { return bestOfTimes(); });
+  }
+
+  /// What continues another motion, or will be continued, begins at the knots of an average.
+  bool mustAverage() const { return moves() || path_.continues(); }
+
+  /// The optimum that is found from an average, or that average if it is faster.
+  Plan optimum(const Plan& average) {
     return onThePath([&] {
-      Plan average = bestOfTimes();
-      // What continues another motion, or will be continued, begins at the knots of an average.
-      if (moves() || path_.continues()) return average;
       std::optional<Plan> optimum = optimumFrom(average);
-      return optimum && optimum->isBetterThan(average) ? *std::move(optimum) : std::move(average);
+      return optimum && optimum->isBetterThan(average) ? *std::move(optimum) : average;
     });
   }
 
@@ -943,6 +949,7 @@ class StopChoice {
     std::size_t first = 0;
     std::size_t last = 0;
     JerkLimitedSection::Plan plan;
+    bool averaged = true;
   };
 
   StopChoice(const Path& path, const std::vector<TimingLimits>& limits, const TimingStart& begin)
@@ -950,19 +957,75 @@ class StopChoice {
 
   std::vector<Run> fastest() {
     JerkLimitedSection section(path_, limits_, begin_);
-    return isOfLines() ? alongLines(section) : byAverages(section);
+    return optimized(isOfLines() ? alongLines(section) : byAverages(section));
   }
 
  private:
   std::vector<Run> byAverages(JerkLimitedSection& section) {
+    std::vector<std::size_t> corners = cornersOf(section);
+    Run whole{0, path_.size() - 1, section.average()};
+    if (!whole.plan.possible()) corners.clear();
+    if (!corners.empty()) longest_ = whole.plan.duration();
+    return choose(path_, std::move(whole), stoppingAt(std::move(corners)));
+  }
+
+  // The stops have been chosen by averages, because an optimum takes much longer to find.
+  std::vector<Run> optimized(std::vector<Run> runs) const {
+    std::vector<Run> found;
+    const Path path = withStopsAfter(runs);
+    TimingStart begin = begin_;
+    for (Run& run : runs) {
+      const std::size_t first = run.first;
+      const Path part = path.part(first, run.last);
+      run.last -= first;
+      run.first = 0;
+      std::vector<Run> of_run = StopChoice(part, limits_, begin).optimum(std::move(run));
+      begin = atRest(begin.before + durationOf(of_run));
+      for (Run& each : of_run) {
+        each.first += first;
+        each.last += first;
+        found.push_back(std::move(each));
+      }
+    }
+    return found;
+  }
+
+  // The optimum found from a motion along the whole path, or those between all stops that may be
+  // faster.
+  std::vector<Run> optimum(Run whole) {
+    std::vector<Run> found;
+    JerkLimitedSection section(path_, limits_, begin_);
+    found.push_back(std::move(whole));
+    if (!found[0].averaged || !found[0].plan.possible() || section.mustAverage()) return found;
+    longest_ = found[0].plan.duration();
+    std::vector<Run> stopping = stoppingAt(cornersOf(section));
+    found[0].plan = section.optimum(found[0].plan);
+    const Path path = withStopsAfter(stopping);
+    TimingStart begin = begin_;
+    for (Run& run : stopping) {
+      const Path part = path.part(run.first, run.last);
+      if (run.averaged) {
+        run.plan = JerkLimitedSection(part, limits_, begin).optimum(run.plan);
+      }
+      begin = atRest(begin.before + run.plan.duration());
+    }
+    return stopping.empty() || durationOf(found) <= durationOf(stopping) ? std::move(found)
+                                                                         : std::move(stopping);
+  }
+
+  Path withStopsAfter(const std::vector<Run>& runs) const {
+    std::vector<std::size_t> stops;
+    for (std::size_t i = 0; i + 1 < runs.size(); ++i) stops.push_back(runs[i].last);
+    return path_.withStops(stops);
+  }
+
+  // Those at which a stop may be faster.
+  std::vector<std::size_t> cornersOf(const JerkLimitedSection& section) const {
     std::vector<std::size_t> corners;
     for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
       if (path_.isSeparate(i) && section.mayStopAt(i)) corners.push_back(i);
     }
-    Run whole{0, path_.size() - 1, section.fastest()};
-    if (!whole.plan.possible()) corners.clear();
-    if (!corners.empty()) longest_ = whole.plan.duration();
-    return choose(path_, std::move(whole), stoppingAt(std::move(corners)));
+    return corners;
   }
 
   // Whether it is a motion from rest along lines whose corners are rounded one by one, which won't
@@ -1040,7 +1103,8 @@ class StopChoice {
       Run run{first, last,
               JerkLimitedSection(part, limits_, rest)
                   .throughCorners({speeds.begin() + static_cast<std::ptrdiff_t>(first),
-                                   speeds.begin() + static_cast<std::ptrdiff_t>(last)})};
+                                   speeds.begin() + static_cast<std::ptrdiff_t>(last)}),
+              false};
       // A slowdown as a whole isn't known to the look-ahead.
       std::vector<Run> stopping;
       if (first < last && run.plan.slowdown > 1.0 + kNoExcess) {
@@ -1074,7 +1138,7 @@ class StopChoice {
     const TimingStart begin = first == 0 ? begin_ : atRest(begin_.before + longest_);
     JerkLimitedSection section(part, limits_, begin);
     const bool line = first == last && StopChoice(part, limits_, begin).isOfLines();
-    return {first, last, line ? section.throughCorners({}) : section.fastest()};
+    return {first, last, line ? section.throughCorners({}) : section.average(), !line};
   }
 
   // The runs from one corner to the next. Those at which a motion that begins at a speed can't stop
