@@ -975,6 +975,10 @@ class StopChoice {
     const Path path = withStopsAfter(runs);
     TimingStart begin = begin_;
     for (Run& run : runs) {
+      if (!run.plan.possible()) {  // it has no duration
+        found.push_back(std::move(run));
+        return found;
+      }
       const std::size_t first = run.first;
       const Path part = path.part(first, run.last);
       run.last -= first;
@@ -996,7 +1000,7 @@ class StopChoice {
     std::vector<Run> found;
     JerkLimitedSection section(path_, limits_, begin_);
     found.push_back(std::move(whole));
-    if (!found[0].averaged || !found[0].plan.possible() || section.mustAverage()) return found;
+    if (!found[0].averaged || section.mustAverage()) return found;
     longest_ = found[0].plan.duration();
     std::vector<Run> stopping = stoppingAt(cornersOf(section));
     found[0].plan = section.optimum(found[0].plan);
