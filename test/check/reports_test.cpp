@@ -97,7 +97,7 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   config.driver = driver::driverChip("drv8825");
   config.pins.step.line = "S";
   config.pins.ms1.line = "M";
-  config.endstop_min = config::Endstop{"E", true, Bias::kAsIs};
+  config.endstop_min = config::Endstop{{"E", true, Bias::kAsIs}};
   config.fault = config::FaultPin{"F", Bias::kAsIs};
   std::string pins;
   for (const NamedLine& line : linesOf({config})) pins += line.pin + "=" + line.line + " ";

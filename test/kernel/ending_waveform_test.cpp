@@ -63,7 +63,7 @@ TEST_F(Ending, ByAStopSlowsDownAsPlanned) {
 
 TEST_F(Ending, AtAnEndstopSendsNoStepAfterItReadsActive) {
   auto config = axisAt("x", "drv8825", placeAt("board-0", 0));
-  config.endstop_max = config::Endstop{"board-1:3", true};
+  config.endstop_max = config::Endstop{{"board-1:3", true}};
   const std::vector<config::AxisConfig> axes = {config};
   KernelBench bench(axes);
   const axis::Move move = bench.start("x", kFar);

@@ -242,6 +242,7 @@ void Homing::succeed(double trigger, double skew, const std::string& remark) {
 void Homing::conclude(const std::string& message, bool stands) {
   phase_ = HomingPhase::kNone;
   axis_.is_being_homed = false;
+  if (presses_ && result_.end != HomingEnd::kHomed) axis_.distrust();
   stroke_.reset();
   result_.axis = axis_.name();
   result_.position = axis_.positionNow();

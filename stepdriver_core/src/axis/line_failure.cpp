@@ -15,7 +15,7 @@ namespace {
 
 /// What has happened, and what to do about it.
 std::string causeOf(const pulse::LineFailure& failure, const LineNames& names) {
-  const std::string known = names.failure ? names.failure(failure.input, failure.line) : "";
+  std::string known = names.failure ? names.failure(failure.input, failure.line) : "";
   if (!known.empty()) return known;
   return fmt::format("{}; {}", gpio::errorText(failure.error),
                      failure.error == ENODEV ? "plug it in and start the node again"

@@ -14,8 +14,8 @@ inline config::AxisConfig axisConfig(const std::string& name) {
   config.microsteps = 16;
   config.steps_per_unit = 80000.0;
   config.max_speed = 0.1;
-  config.endstop_min = config::Endstop{name + "_min", true};
-  config.endstop_max = config::Endstop{name + "_max", true};
+  config.endstop_min = config::Endstop{{name + "_min", true}};
+  config.endstop_max = config::Endstop{{name + "_max", true}};
   return config;
 }
 

@@ -22,7 +22,7 @@ using axis::HomingResult;
 using test::Bench;
 using test::kStep;
 
-constexpr int kGconf = 0x00;
+constexpr int kGlobalConfiguration = 0x00;
 constexpr int kCurrents = 0x10;
 constexpr int kChopsAbove = 0x13;
 constexpr int kStallAbove = 0x14;
@@ -85,7 +85,7 @@ struct WithWall {
   std::vector<std::uint32_t> registers() {
     std::vector<std::uint32_t> values;
     for (const int number :
-         {kGconf, kCurrents, kChopsAbove, kStallAbove, kStallBelow, kStallOnSpi}) {
+         {kGlobalConfiguration, kCurrents, kChopsAbove, kStallAbove, kStallBelow, kStallOnSpi}) {
       values.push_back(bench.rig.registerOf("x", number));
     }
     return values;
@@ -195,7 +195,7 @@ TEST_P(StallHoming, IsArmedAtConstantSpeedOnly) {
       slowest = std::min(slowest, std::abs(machine.x().state().velocity));
       EXPECT_LT(written(kCurrents) >> 8U & 0x1FU, run);
       if (GetParam().isOnSpi()) {
-        EXPECT_EQ(written(kGconf) & 4U, 0U) << "it doesn't chop as in SpreadCycle";
+        EXPECT_EQ(written(kGlobalConfiguration) & 4U, 0U) << "it doesn't chop as in SpreadCycle";
         EXPECT_EQ(written(kStallOnSpi), 0x580000U) << "-40 in 7 bits";
       } else {
         EXPECT_EQ(written(kChopsAbove), 0U);

@@ -2161,10 +2161,8 @@ void Participants::probeAxis(std::size_t axis) {
   if (configs_[axis].pins.sleep.wired()) must("wake", machine::Sleep{axis, false});
   must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
-  // The block has kept it from where it counts itself.
-  if (configs_[axis].tmc && !controller_->snapshot()->axes[axis].state.position_valid) {
-    must("set position", machine::SetPosition{axis, before / 1e3});
-  }
+  // At its block it may have lost steps, and count itself anywhere.
+  if (configs_[axis].tmc) must("set position", machine::SetPosition{axis, 0.0});
   const double way = before > 3.0 ? -0.002 : 0.002;
   const std::size_t moves = moves_.size();
   must("move", machine::MoveTo{axis, way, true, 0.0}, true);

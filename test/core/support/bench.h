@@ -41,8 +41,8 @@ inline config::AxisConfig linearAxis(const std::string& name,
   config.max_speed = 0.1;
   config.acceleration = 1.0;
   config.deceleration = 1.0;
-  config.endstop_min = config::Endstop{name + ".min", false};
-  config.endstop_max = config::Endstop{name + ".max", false};
+  config.endstop_min = config::Endstop{{name + ".min", false}};
+  config.endstop_max = config::Endstop{{name + ".max", false}};
   config.enable_on_start = true;
   return config;
 }
