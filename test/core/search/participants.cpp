@@ -1778,6 +1778,7 @@ void Participants::checkTroubles() {
 
 // At rest they are what the axis says of its driver.
 void Participants::checkRegisters() {
+  if (had_trouble_ && closed_) return;  // a machine that was shut down asks no chip
   namespace tmc = driver::tmc;
   if (!hasRegisters(configs_)) return;
   if (!playUntil([this] { return accesses_.empty() && accesses_done_.empty(); }, kLongestCall)) {
