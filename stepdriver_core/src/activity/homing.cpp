@@ -193,6 +193,7 @@ void Homing::enter(HomingPhase phase, double direction) {
 }
 
 void Homing::begin(Goal goal) {
+  presses_ = presses_ || goal.until_block;
   goal.measures = true;
   axis_.refuseUnlessReady();
   stroke_ = std::make_unique<MotionExecution>(context(), std::vector<Order>{{&axis_, goal}});

@@ -78,9 +78,6 @@ class Homing : public Activity {
   /// Clock time.
   pulse::Nanoseconds phaseBegan() const { return phase_began_; }
   void begin(Goal goal);
-  /// It moves against a block, where the motor loses steps until that is noticed: unless the homing
-  /// succeeds, the position can't be trusted.
-  void pressOnBlock() { presses_ = true; }
   MotionExecution* stroke() { return stroke_.get(); }
   void endStroke() { stroke_.reset(); }
   /// The last move: from the trigger point to the final position. @param trigger [microsteps of the
@@ -116,7 +113,7 @@ class Homing : public Activity {
   std::int64_t bound_ = 0;
   pulse::Nanoseconds phase_began_ = 0;
   bool was_homed_ = false;
-  bool presses_ = false;
+  bool presses_ = false;  // a stroke was against a block, where the motor loses steps
 };
 
 }  // namespace stepdriver::activity

@@ -38,7 +38,6 @@ void HomingToBlock::approach(axis::HomingPhase phase) {
             : bound();
   goal.velocity = again ? config_.latch_speed : config_.seek_speed;
   goal.until_block = true;
-  pressOnBlock();
   begin(std::move(goal));
 }
 

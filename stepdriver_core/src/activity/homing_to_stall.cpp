@@ -101,7 +101,6 @@ void HomingToStall::approach() {
   goal.target = bound();
   goal.velocity = config_.seek_speed;
   goal.until_block = true;
-  pressOnBlock();
   begin(std::move(goal));
 }
 
