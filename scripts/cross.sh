@@ -93,7 +93,7 @@ END
       [[ " ${tests_of_this_computer[*]} " == *" $name "* ]] || tests+=("$name")
     done
   fi
-  quietly "node-$arch-tests" cmake --build "$build/catkin" -j "$jobs" --target "${tests[@]}"
+  quietly "node-$arch-tests" cmake --build "$build/catkin" -j "$jobs" --target node_tests
   use_ros "$build/catkin/devel"
   for name in "${tests[@]}"; do
     STEPDRIVER_NODE=$cross/stepdriver_node rostest "$src/test/node/node.test" "test:=$name" || status=1

@@ -490,7 +490,7 @@ sanitize_node() {
   local preset=$1 findings=$build/log/$1-findings name status=0
   shift
   await "build_node_$preset"
-  quietly "$preset-tests-build" build_node_tests storm_test "$@"
+  quietly "$preset-tests-build" build_node_tests storm_test node_tests
   rm -f "$findings".*
   use_test_preset "$preset"
   for name in ASAN_OPTIONS TSAN_OPTIONS UBSAN_OPTIONS; do

@@ -277,11 +277,15 @@ void ChipModel::checkReadiness(std::int64_t time_ns) {
   }
 }
 
-void ChipModel::configure(const Configured& registers, std::int64_t time_ns) {
-  if (by_registers_ && decoded_ != registers.microsteps) {
+void ChipModel::write(const Configured& registers, std::int64_t time_ns) {
+  if (decoded_ != registers.microsteps) {
     mode_changed_ns_ = time_ns;
     checkTime(step_active_ns_, time_ns, chip_.timing.mode_hold_ns, Violation::kModeHold);
   }
+  configure(registers);
+}
+
+void ChipModel::configure(const Configured& registers) {
   by_registers_ = true;
   decoded_ = registers.microsteps;
   outputs_on_ = registers.outputs_on;

@@ -70,7 +70,7 @@ RigAxis::RigAxis(const RigAxisSpec& spec, Slides& slides)
   if (spec_.spring) mass_.emplace(spec_.spring->frequency, spec_.spring->damping, spec_.start);
   if (spec_.tmc) {
     tmc_.emplace(*spec_.tmc);
-    chip_.configure(tmc_->configured(), kForEver);
+    chip_.configure(tmc_->configured());
     energized_ = chip_.energized();
   }
   placeStops();
@@ -159,7 +159,7 @@ void RigAxis::meetPower(std::int64_t time_ns) {
   chip_.powerUp();
   if (tmc_) {
     tmc_->reset();
-    chip_.configure(tmc_->configured(), time_ns);
+    chip_.configure(tmc_->configured());
   }
   if (spec_.chip.fault_end != driver::FaultEnd::kItself) mendChip();
   energized_ = isEnergizedAt(time_ns);
@@ -436,12 +436,12 @@ std::uint32_t RigAxis::tstep() const {
 void RigAxis::writeRegister(int number, std::uint32_t value, std::int64_t time_ns) {
   advance(time_ns);
   tmc_->write(number, value);
+  chip_.write(tmc_->configured(), time_ns);
   takeRegisters(time_ns);
 }
 
 void RigAxis::takeRegisters(std::int64_t time_ns) {
   if (swing_) swing_->setTorque(tmc_->torque());
-  chip_.configure(tmc_->configured(), time_ns);
   follow({}, time_ns);
 }
 
@@ -451,12 +451,14 @@ void RigAxis::powerChip(bool has_power, std::int64_t time_ns) {
   tmc_->reset();
   chip_.powerUp();
   mendChip();
+  chip_.configure(tmc_->configured());
   takeRegisters(time_ns);
 }
 
 void RigAxis::setTrouble(const TmcTrouble& trouble, std::int64_t time_ns) {
   advance(time_ns);
   tmc_->setTrouble(trouble);
+  chip_.configure(tmc_->configured());
   takeRegisters(time_ns);
 }
 

@@ -319,5 +319,16 @@ TEST(FoundSchedules, CurrentsThatAreOnTheirWayAreThoseOfTheRegistersAfterARecove
   }
 }
 
+// The rig's judge took a chip's loss of its power, at the time of a step, for a change of its
+// microsteps by the host.
+TEST(FoundSchedules, AChipThatLosesItsPowerAtAStepDoesNotChangeItsMicrosteps) {
+  for (std::size_t after = 0; after < 100; ++after) {
+    expectGood({kRegisters,
+                {does(0, 0, "move x by -6 mm"), does(0, 16, "hold"),
+                 does(1, after, "the chip of x is silent")},
+                {}});
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::search
