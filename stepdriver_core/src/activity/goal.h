@@ -54,6 +54,7 @@ struct Goal {
   /// Its steps are never late by more than a quarter of an interval: its end measures a place.
   bool measures = false;
   bool until_block = false;                  ///< see pulse::Follow
+  bool ignores_override = false;             ///< what it measures depends on its speed
   std::shared_ptr<const MarksOfPath> marks;  ///< of its path; may be empty
   motion::MotionLimits path_limits;  ///< [microsteps] the limits that the path of a kTogether keeps
   /// At the target the axis waits for a path that continues its own: it isn't the end.

@@ -99,6 +99,8 @@ class HomingToStall final : public Homing {
   HomingToStall(Context& context, axis::AxisModel& axis, std::uint64_t id,
                 std::shared_ptr<Result> outcome);
 
+  void speedChanged(const SharedCall& call) override;
+
  protected:
   void start() override;
   void strokeEnded() override;
@@ -109,6 +111,8 @@ class HomingToStall final : public Homing {
  private:
   enum class Waits { kNothing, kPrepared, kArmed, kLoad, kDisarmed, kBackedOff, kEnded };
 
+  /// Why it can't come to its speed; empty if it can.
+  std::string limitedSpeed() const;
   void post(bus::RegisterJob job, Waits waits);
   void take(const bus::RegisterDone& done);
   void approach();

@@ -44,9 +44,24 @@ std::string HomingToStall::unmet() const {
 void HomingToStall::start() {
   if (!axis_.sharers().empty())
     return failNow("it shares its motors, and a stall is of one of them");
+  if (const std::string limited = limitedSpeed(); !limited.empty()) return failNow(limited);
   enter(axis::HomingPhase::kSeeking, towards_);
   chip_.notePreparedForStall();
   post(chip_.prepareStall(), Waits::kPrepared);
+}
+
+// Below its speed the detection is never armed: the motor would press on until max_travel.
+std::string HomingToStall::limitedSpeed() const {
+  if (axis_.maxSpeed() >= kAtSpeed * config_.seek_speed) return "";
+  return fmt::format("its speed is limited to {}, and its stall is detected at {} only",
+                     axis_.show(axis_.maxSpeed(), "/s"), axis_.show(config_.seek_speed, "/s"));
+}
+
+void HomingToStall::speedChanged(const SharedCall& call) {
+  const std::string limited = isApproach() ? limitedSpeed() : "";
+  if (limited.empty()) return Homing::speedChanged(call);
+  fail(limited, axis::HomingEnd::kFailed, call);
+  poll();
 }
 
 // ---- the registers ----
@@ -92,6 +107,7 @@ void HomingToStall::take(const bus::RegisterDone& done) {
 // ---- the approaches ----
 
 void HomingToStall::approach() {
+  if (const std::string limited = limitedSpeed(); !limited.empty()) return failNow(limited);
   ++approaches_;
   enter(approaches_ == 1 ? axis::HomingPhase::kSeeking : axis::HomingPhase::kLatching, towards_);
   armed_ = false;
@@ -101,6 +117,7 @@ void HomingToStall::approach() {
   goal.target = bound();
   goal.velocity = config_.seek_speed;
   goal.until_block = true;
+  goal.ignores_override = true;
   begin(std::move(goal));
 }
 
@@ -139,7 +156,10 @@ void HomingToStall::watch() {
     if (!hasDiag()) post(chip_.readLoad(), Waits::kLoad);
     return;
   }
-  if (!isAtSpeed()) return;
+  if (!isAtSpeed()) {
+    at_speed_since_ = pulse::kNever;
+    return;
+  }
   const double rate = config_.seek_speed * axis_.stepsPerUnit() / fullStep();
   at_speed_since_ = std::min(at_speed_since_, context().now);
   const auto measures = static_cast<pulse::Nanoseconds>(kMeasuresIn / rate * 1e9);

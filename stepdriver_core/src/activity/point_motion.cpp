@@ -198,9 +198,9 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t no
                   std::int64_t at) {
   const motion::MotionState from = axis.motor.stateAt(at);
   const bool slows_down = goal.runs() && goal.velocity == 0.0;
+  const double factor = goal.ignores_override ? 1.0 : axis.mode.speed_override;
   const double velocity =
-      slows_down ? axis.maxSpeed()
-                 : std::min(std::abs(goal.velocity) * axis.mode.speed_override, axis.maxSpeed());
+      slows_down ? axis.maxSpeed() : std::min(std::abs(goal.velocity) * factor, axis.maxSpeed());
   const motion::MotionLimits within = axis.limits(velocity);
   const std::int64_t slows_ns =
       goal.kind == Goal::Kind::kSetpoint ? goal.setpoint.until_ns : motor::Motion::kNeverSlows;

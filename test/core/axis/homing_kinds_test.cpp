@@ -234,6 +234,7 @@ TEST_F(HomingToBlockTest, EndsWithAStopADisableAndAnEmergencyStop) {
     EXPECT_TRUE(done);
     EXPECT_EQ(result.end, HomingEnd::kFailed) << i;
     EXPECT_FALSE(x().state().homed) << i;
+    EXPECT_FALSE(x().state().position_valid) << i;
     EXPECT_GT(carriage(), -0.05) << i;
   }
 }

@@ -208,6 +208,108 @@ TEST_P(StallHoming, IsArmedAtConstantSpeedOnly) {
   EXPECT_GT(written(kChopsAbove), 0U);
 }
 
+// Its detection is for one speed: at another one the motor would press against the block.
+TEST_P(StallHoming, ApproachesAtItsSpeedWhateverTheOverride) {
+  for (const double factor : {0.01, 0.5, 2.0}) {
+    for (const bool in_motion : {false, true}) {
+      WithWall machine(stallAxis(GetParam()));
+      machine::Machine& all = *machine.bench.machine;
+      if (!in_motion) all.setSpeedOverride(factor);
+      double fastest = 0.0;
+      bool is_changed = false;
+      const HomingResult result = machine.x().home([&] {
+        fastest = std::max(fastest, std::abs(machine.x().state().velocity));
+        if (in_motion && !is_changed && fastest > 0.02) {
+          all.setSpeedOverride(factor);
+          is_changed = true;
+        }
+        return false;
+      });
+      EXPECT_EQ(result.end, HomingEnd::kHomed) << factor << ": " << result.message;
+      if (factor < 1.0) {
+        EXPECT_NEAR(fastest, 0.05, 1e-4) << factor;
+      }
+      EXPECT_LT(std::abs(machine.error()), 64.0) << factor;
+      machine.expectRegistersAsBefore();
+    }
+  }
+}
+
+TEST_P(StallHoming, IsRefusedOrEndsIfItsSpeedIsBeyondTheLimit) {
+  WithWall before(stallAxis(GetParam()));
+  axis::AxisLimits slow = before.x().limits();
+  slow.max_speed = 0.02;
+  before.x().setLimits(slow);
+  HomingResult result = before.x().home();
+  EXPECT_EQ(result.end, HomingEnd::kFailed);
+  EXPECT_TRUE(contains(result.message,
+                       "its speed is limited to 0.02 m/s, and its stall is detected at 0.05 m/s"))
+      << result.message;
+  before.expectRegistersAsBefore();
+  EXPECT_EQ(before.x().state().position, 0.0);
+
+  for (const double at : {0.02, 0.0499}) {
+    WithWall during(stallAxis(GetParam()));
+    double fastest = 0.0;
+    bool is_limited = false;
+    result = during.x().home([&] {
+      fastest = std::max(fastest, std::abs(during.x().state().velocity));
+      if (!is_limited && fastest > at) {
+        during.x().setLimits(slow);
+        is_limited = true;
+      }
+      return false;
+    });
+    EXPECT_TRUE(is_limited);
+    EXPECT_EQ(result.end, HomingEnd::kFailed) << at;
+    EXPECT_TRUE(contains(result.message, "its speed is limited to 0.02 m/s")) << result.message;
+    during.bench.machine->advance(0.3);
+    during.expectRegistersAsBefore();
+    EXPECT_EQ(during.x().state().fault, "");
+    EXPECT_FALSE(during.x().state().position_valid);
+  }
+}
+
+// Stopped, disabled, at fault, at an emergency stop, or beyond max_travel: the motor may have lost
+// steps at the block.
+TEST_P(StallHoming, LeavesNoPositionValidIfItDoesNotSucceed) {
+  using End = void (*)(WithWall&);
+  const std::vector<End> ends = {[](WithWall& machine) { machine.x().stop(); },
+                                 [](WithWall& machine) { machine.x().enable(false); },
+                                 [](WithWall& machine) { machine.bench.machine->emergencyStop(); },
+                                 [](WithWall& machine) { machine.bench.rig.powerChip("x", false); },
+                                 [](WithWall& machine) {
+                                   machine.bench.machine->hold();
+                                   machine.bench.machine->advance(0.5);
+                                   machine.x().stop();
+                                 }};
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    WithWall machine(stallAxis(GetParam()));
+    ASSERT_EQ(machine.x().home().end, HomingEnd::kHomed);
+    machine.bench.move(0.0);
+    ASSERT_TRUE(machine.x().state().position_valid);
+    bool ended = false;
+    const HomingResult result = machine.x().home([&] {
+      if (ended || std::abs(machine.x().state().velocity) < 0.04) return false;
+      ended = true;
+      ends[i](machine);
+      return false;
+    });
+    EXPECT_NE(result.end, HomingEnd::kHomed) << i;
+    EXPECT_FALSE(machine.x().state().homed) << i;
+    EXPECT_FALSE(machine.x().state().position_valid) << i << ": " << result.message;
+  }
+  WithWall without(stallAxis(GetParam()), 0.1, false);
+  without.x().setPosition(0.0);
+  EXPECT_EQ(without.x().home().end, HomingEnd::kFailed);
+  EXPECT_FALSE(without.x().state().position_valid);
+  without.x().setPosition(0.0);
+  bool moved = false;
+  EXPECT_EQ(without.x().home([&] { return moved = moved || without.x().state().moving; }).end,
+            HomingEnd::kCancelled);
+  EXPECT_FALSE(without.x().state().position_valid);
+}
+
 TEST_P(StallHoming, KeepsItsCurrentToTheEnd) {
   WithWall machine(stallAxis(GetParam()));
   std::string refusal;

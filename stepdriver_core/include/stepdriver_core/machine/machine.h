@@ -288,7 +288,7 @@ class Machine {
   void checkHoming(const std::vector<std::string>& names = {}) const;
 
   /// Scales the velocities of all motions, including those in progress, within the limits of their
-  /// axes.
+  /// axes. The approaches of a homing to a stall keep their speed.
   ///
   /// @param factor 0.01 to 2.0. @throw Refused if it is outside of that; then nothing changes.
   void setSpeedOverride(double factor);
