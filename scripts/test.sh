@@ -285,10 +285,7 @@ build_core_quietly() {
 # The search takes more than half of the time of all these tests: usually it plays a part of its schedules.
 test_core() {
   local usual=()
-  if [[ -z $thorough ]]; then
-    export STEPDRIVER_SCHEDULES=5000
-    usual=(--exclude-regex ForEachPairOfRequests)
-  fi
+  [[ -n $thorough ]] || usual=(--exclude-regex ForEachPairOfRequests)
   (cd "$build/core" && ctest -j "$jobs" --timeout 300 --no-tests=error --output-on-failure "${usual[@]}")
 }
 
@@ -456,33 +453,32 @@ for key, value in next(p for p in presets if p["name"] == name)["environment"].i
 }
 
 build_core_asan() {
-  configure_sanitized asan && build_sanitized asan machine_tests pulse_tests recorder_tests search_tests
+  configure_sanitized asan && build_sanitized asan machine_tests pulse_tests recorder_tests search_tests threads_tests
 }
+# Those with more than one thread: the others have nothing to find for ThreadSanitizer.
 build_core_tsan() {
-  configure_sanitized tsan && build_sanitized tsan gpio_tests machine_tests port_tests pulse_tests recorder_tests
+  configure_sanitized tsan && build_sanitized tsan gpio_tests port_tests pulse_tests recorder_tests threads_tests
 }
 # After those of the core.
 build_node_asan() { build_sanitized asan stepdriver_node; }
 build_node_tsan() { build_sanitized tsan stepdriver_node; }
 
-# sanitize_core PRESET EXCLUDED: runs the tests of the programs that are built, but those of a pattern.
+# sanitize_core PRESET: runs the tests of the programs that are built.
 sanitize_core() {
   local preset=$1
   await "build_core_$preset"
   use_test_preset "$preset"
   # The number of schedules of each kind that the search samples.
   STEPDRIVER_SCHEDULES=400 ctest --test-dir "$build/catkin-$preset/stepdriver_core" -j "$jobs" --timeout 300 \
-    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$2"
+    --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$slow_tests"
 }
 # Tests that take long with a sanitizer are excluded: searches, and random courses, of which others make
-# short ones. The search and some other tests have one thread, so ThreadSanitizer has nothing to find in them.
+# short ones.
 slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess|'\
 'RandomQueue.*BacklashJerk|RandomLines.WithAJerk|SmoothPathQueue.OfRandomLines|QueuedPath.NeedsMemory|'\
 'OfAStopARecoveryAndTwoOthers'
-tests_without_threads='^(FlagCheckTest|FormulaOnTheEngine|Path|PathDecades|PathQueue|ProbeTest|SmoothPath|'\
-'SmoothPathQueue|StallHoming|StreamedPoints|TmcStorm)\.|/StallHoming\.'
-sanitize_core_asan() { sanitize_core asan "$slow_tests"; }
-sanitize_core_tsan() { sanitize_core tsan "$slow_tests|$tests_without_threads"; }
+sanitize_core_asan() { sanitize_core asan; }
+sanitize_core_tsan() { sanitize_core tsan; }
 
 # sanitize_node PRESET TEST...: runs a storm and tests of --ros. Only the node that they start has the
 # sanitizer. It writes its findings to files, because not every test reads all that its node prints.
