@@ -12,6 +12,7 @@
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
+#include "support/test_board.h"
 
 namespace stepdriver::kernel {
 namespace {
@@ -33,6 +34,12 @@ bool timeTravels() {
   std::ifstream file("/proc/cmdline");
   const std::string arguments{std::istreambuf_iterator<char>(file), {}};
   return arguments.find("time-travel") != std::string::npos;
+}
+
+std::string missingVirtualTime() {
+  std::string board = test::gpioSimBoard().missing();
+  if (!board.empty()) return board;
+  return timeTravels() ? "" : "runs in virtual time (run.sh --time-travel)";
 }
 
 Recording::Recording() { runGpioTrace("start"); }

@@ -22,6 +22,17 @@ namespace stepdriver::kernel {
 /// Whether this kernel's time is virtual: `run.sh --time-travel`.
 bool timeTravels();
 
+/// Why a test that needs gpio-sim and virtual time can't run; empty: it can.
+std::string missingVirtualTime();
+
+/// The duration of a read of the clock in virtual time [ns]. That kernel also reads it for each
+/// event of a trace.
+constexpr std::int64_t kClockRead = 256;
+
+/// The guard of the clock in virtual time, where a sleep is exact, and each read of the clock while
+/// spinning is a system call.
+constexpr pulse::Nanoseconds kExactGuard = 2'000;
+
 /// Records the kernel's gpio tracepoints from now on. Only one recording is possible at a time.
 class Recording {
  public:

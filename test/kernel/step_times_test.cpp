@@ -10,7 +10,6 @@
 
 #include "kernel_bench.h"
 #include "stepdriver_core/axis/axis.h"
-#include "support/test_board.h"
 #include "waveform.h"
 
 // Tests the times of steps that go through the real libgpiod to a real kernel's lines, in that
@@ -21,16 +20,9 @@
 namespace stepdriver::kernel {
 namespace {
 
-/// The duration of a read of the clock on that kernel, which also reads it for each event of a
-/// trace.
-constexpr std::int64_t kClockRead = 256;
-
 /// A pulse may have to wait for one write of another axis. That includes reads of the clock before
 /// and after the write, and an event for each line of its chip.
 constexpr std::int64_t kOtherWrites = 12 * kClockRead;
-
-/// On that kernel a sleep is exact, and each read of the clock while spinning is a system call.
-constexpr pulse::Nanoseconds kGuard = 2'000;
 
 /// The time at which step k of a move of n steps from rest to rest is due, in nanoseconds after the
 /// start: the motion crosses k - 1/2 then. The ramps end at full speed, or halfway.
@@ -111,12 +103,6 @@ void expectNothingLost(const Waveform& seen, const Moves& moves, const Speed& sp
   EXPECT_NEAR(felt.largest_lag_degrees, motorViewOf(planned, microsteps).largest_lag_degrees, 0.5);
 }
 
-std::string missing() {
-  std::string board = test::gpioSimBoard().missing();
-  if (!board.empty()) return board;
-  return timeTravels() ? "" : "runs in virtual time (run.sh --time-travel)";
-}
-
 void print(std::size_t edges, double steps_s, double worst, std::size_t violations) {
   std::printf(
       "[ KERNEL   ] %zu edges read from the kernel at up to %.0f steps/s: step times within "
@@ -127,14 +113,14 @@ void print(std::size_t edges, double steps_s, double worst, std::size_t violatio
 class StepTimes : public testing::TestWithParam<Speed> {
  protected:
   void SetUp() override {
-    if (!missing().empty()) GTEST_SKIP() << missing();
+    if (!missingVirtualTime().empty()) GTEST_SKIP() << missingVirtualTime();
   }
 };
 
 TEST_P(StepTimes, AreThoseOfTheClosedFormToAMicrosecond) {
   const Speed& speed = GetParam();
   const auto config = configOf("x", {{"board-0:0"}, {"board-0:1"}, {"board-0:2"}}, speed);
-  KernelBench bench({config}, kGuard);
+  KernelBench bench({config}, kExactGuard);
   const Moves moves = {3'000, -4'000, 37};
   for (const std::int64_t move : moves) {
     EXPECT_EQ(bench.axis("x").wait(bench.start("x", move)).end, axis::MoveEnd::kReached);
@@ -161,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(At, StepTimes,
 class StepTimesOfTwoAxes : public testing::Test {
  protected:
   void SetUp() override {
-    if (!missing().empty()) GTEST_SKIP() << missing();
+    if (!missingVirtualTime().empty()) GTEST_SKIP() << missingVirtualTime();
   }
 };
 
@@ -171,7 +157,7 @@ TEST_F(StepTimesOfTwoAxes, AreLaterOnlyByTheWritesOfTheOther) {
   const std::vector<config::AxisConfig> configs = {
       configOf("x", {{"board-0:0"}, {"board-0:1"}, {"board-0:2"}}, speed_x),
       configOf("y", {{"board-1:0"}, {"board-0:5", true}, {"board-1:2"}}, speed_y)};
-  KernelBench bench(configs, kGuard);
+  KernelBench bench(configs, kExactGuard);
   const Moves moves_x = {3'000, -2'000};
   const Moves moves_y = {-2'000, 1'500};
   for (std::size_t i = 0; i < moves_x.size(); ++i) {
