@@ -547,6 +547,37 @@ TEST_F(PathOutputs, ManyMarksCostNoTimeOfThePath) {
   expectWithSteps(counts);
 }
 
+TEST_F(PathOutputs, AHundredThousandMarksOfAPathInParts) {
+  constexpr std::int64_t kMarks = 100'000;
+  constexpr std::int64_t kPart = 10'000;
+  std::vector<std::int64_t> counts;
+  for (std::int64_t i = 1; i <= kMarks + 1; ++i) counts.push_back(2 * i);
+  PathRequest all = dashes(counts);
+  PathRequest first = all;
+  first.segments.resize(kPart);
+  first.more_follows = true;
+  const CoordinatedMove move = followPath(first);
+  for (std::int64_t from = kPart; from <= kMarks; from += kPart) {
+    const auto begin = all.segments.begin() + from;
+    const auto end = all.segments.begin() + std::min(from + kPart, kMarks + 1);
+    while (steps("x").empty() || bench->pulses("x") < 2 * from - kPart) advance(0.01);
+    machine().appendPath({move.id(), {begin, end}, end != all.segments.end()});
+  }
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.marks_made, 100'000U);
+  EXPECT_EQ(result.marks_not_made, 0U);
+  counts.pop_back();
+  const std::vector<Step> made = steps("x");
+  const std::vector<std::int64_t> times = edges();
+  ASSERT_EQ(times.size(), counts.size());
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const Step& step = made.at(static_cast<std::size_t>(counts[i]) - 1);
+    ASSERT_EQ(step.count, counts[i]);
+    ASSERT_LE(std::abs(times[i] - step.time_ns), 1) << i;
+  }
+}
+
 // ---- random motions ----
 
 // Random places, and random holds, overrides and stops at random times. The oracle knows only the

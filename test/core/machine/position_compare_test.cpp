@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -550,9 +551,33 @@ TEST_F(PositionCompareTest, AHundredThousandPlacesCostNoTime) {
   axes[0].min_position = -1.0;
   begin();
   machine().setPositionCompare("camera", every(1e-6, 0.0, 0.1, 1e-5));
-  move(1e-3);
-  EXPECT_EQ(shown().compared, 1000U) << "the first place is where it stands";
+  move(0.1);
+  EXPECT_EQ(shown().compared, 100'000U) << "the first place is where it stands";
   EXPECT_EQ(shown().missed, 0U);
+  std::vector<std::int64_t> wanted;
+  for (const Arrival& arrival : arrivals()) {
+    if (arrival.count % 8 == 0) wanted.push_back(arrival.time_ns);
+  }
+  expectTimes(switchedOn(), wanted);
+}
+
+TEST_F(PositionCompareTest, AnOutputThatCannotBeWrittenIsAFaultThatNamesIt) {
+  machine().setPositionCompare("camera", every(0.01, 0.01, 0.09));
+  const axis::Move first = bench->axis("x").moveTo(0.1);
+  while (switchedOn().size() < 2) advance(1e-3);
+  bench->rig.failWrites("camera.line", 0, EIO);
+  const axis::MoveResult result = bench->axis("x").wait(first);
+  EXPECT_EQ(result.end, axis::MoveEnd::kFault) << result.message;
+  EXPECT_NE(
+      state("x").fault.find("the line camera.line of the output camera can't be written: EIO"),
+      std::string::npos)
+      << state("x").fault;
+  EXPECT_EQ(switchedOn().size(), 2U);
+  bench->rig.clearWriteFault("camera.line");
+  machine().recover();
+  bench->axis("x").setPosition(0.05);
+  move(0.075);
+  EXPECT_EQ(switchedOn().size(), 4U) << "at 0.06 and 0.07";
 }
 
 // ---- random motions ----
