@@ -104,6 +104,17 @@ TEST(Screen, ShowsOutputsAndInputsWithTheAgeOfTheirStates) {
   }
 }
 
+TEST(Screen, ShowsWhatAPositionMakesOfAnOutput) {
+  Session session = sessionWith({axisView("x")});
+  session.driver().updateIo({{"camera", false, -3.0, "", "", "x", 41, 2}}, {});
+  const std::string screen = screenText(session, 24, 80);
+  for (const char* words :
+       {"> camera: off 3 s, by x: 41 made, 2 missed", "u no longer by position: camera"}) {
+    EXPECT_TRUE(shows(screen, words));
+  }
+  EXPECT_FALSE(shows(screen, "t switch camera"));
+}
+
 TEST(Screen, SaysWhatASmallWindowCannotShow) {
   Session session = sessionWith(sixAxes());
   session.press({'6'}, 0.0);

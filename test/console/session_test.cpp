@@ -76,6 +76,21 @@ TEST(Session, SwitchesTheChosenOutputToTheOtherState) {
   EXPECT_EQ(switched(session.press({'t'}, 0.0)), "lamp: switch off");
 }
 
+TEST(Session, EndsThePositionCompareOfTheChosenOutput) {
+  Session session = sessionWith({axisView("x")});
+  EXPECT_TRUE(session.press({'u'}, 0.0).calls.empty());
+  EXPECT_TRUE(said(session, "the driver has no output with a name"));
+  session.driver().updateIo({{"pen", true, 0.0, "", ""}, {"camera", false, 0.0, "", "", "x"}}, {});
+  EXPECT_TRUE(session.press({'u'}, 0.0).calls.empty());
+  EXPECT_TRUE(said(session, "pen isn't changed: no position switches it"));
+  const Orders orders = session.press({'n', 'u'}, 0.0);
+  ASSERT_EQ(orders.calls.size(), 1U);
+  EXPECT_EQ(orders.calls.front().what, Call::What::kEndCompare);
+  EXPECT_EQ(orders.calls.front().name(), "camera: end position compare");
+  EXPECT_TRUE(session.press({'u'}, 2.0).calls.empty());
+  EXPECT_TRUE(said(session, "camera isn't changed: the driver's state isn't live"));
+}
+
 TEST(Session, SwitchesNoOutputThatIsNotThereOrWhoseStateIsOld) {
   Session session = sessionWith({axisView("x")});
   EXPECT_TRUE(session.press({'n', 't'}, 0.0).calls.empty());

@@ -10,6 +10,7 @@
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/SetOutput.h>
 #include <stepdriver/SetPosition.h>
+#include <stepdriver/SetPositionCompare.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <algorithm>
@@ -84,6 +85,11 @@ client::Answer carryOutCall(const std::string& driver, const Call& call, const T
       request.name = call.output;
       request.on = call.on;
       return client::askService<SetOutput>(driver + "/set_output", request);
+    }
+    case Call::What::kEndCompare: {
+      SetPositionCompare::Request request;
+      request.output = call.output;
+      return client::askService<SetPositionCompare>(driver + "/set_position_compare", request);
     }
     case Call::What::kHold:
       return client::askService<std_srvs::Trigger>(driver + "/hold");
@@ -256,7 +262,8 @@ void DriverClient::onMessage(const IoStates& states) {
   for (std::size_t i = 0; i < states.output_name.size(); ++i) {
     outputs.push_back({states.output_name[i], states.output_on[i] != 0,
                        changed(states.output_changed[i]), states.output_note[i],
-                       states.output_error[i]});
+                       states.output_error[i], states.output_axis[i], states.output_compared[i],
+                       states.output_missed[i]});
   }
   std::vector<InputView> inputs;
   for (std::size_t i = 0; i < states.input_name.size(); ++i) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -38,6 +39,9 @@ struct OutputView {
   std::optional<double> changed;  ///< [s] when it was switched; empty: not since the start
   std::string note;               ///< why it was switched off by itself
   std::string error;              ///< why `on` isn't certain
+  std::string axis = {};          ///< whose position switches it; empty: none does
+  std::uint64_t compared = 0;     ///< what positions have made it do
+  std::uint64_t missed = 0;       ///< what they could not
 };
 
 /// The state of an input with a name.

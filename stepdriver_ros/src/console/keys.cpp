@@ -46,6 +46,7 @@ const std::map<Key, Command>& commands() {
       {'a', {Action::kHomeAll}},
       {'n', {Action::kNextOutput}},
       {'t', {Action::kSwitchOutput}},
+      {'u', {Action::kEndCompare}},
       {'?', {Action::kHelp}},
       {'q', {Action::kQuit}},
       {kKeyCtrlC, {Action::kQuit}},

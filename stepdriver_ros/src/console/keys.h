@@ -41,6 +41,7 @@ enum class Action {
   kHomeAll,
   kNextOutput,
   kSwitchOutput,
+  kEndCompare,
   kHelp,
   kQuit,
 };

@@ -184,8 +184,13 @@ std::vector<Row> ioRows(const Session& session, int columns, double now) {
   const OutputView* const chosen = session.chosenOutput();
   std::vector<std::string> texts{"outputs"};
   for (const OutputView& output : driver.outputs()) {
-    texts.push_back((output.name == chosen->name ? "> " : "") +
-                    text(output.name, output.on ? "on" : "off", output.changed));
+    std::string shown = (output.name == chosen->name ? "> " : "") +
+                        text(output.name, output.on ? "on" : "off", output.changed);
+    if (!output.axis.empty()) {
+      shown += fmt::format(", by {}: {} made, {} missed", shortName(output.axis, kShortName),
+                           output.compared, output.missed);
+    }
+    texts.push_back(std::move(shown));
   }
   if (texts.size() > 1) append(rows, packed(texts, columns));
   texts = {"inputs"};
@@ -247,7 +252,10 @@ std::vector<Row> helpRows(const Session& session, int columns) {
                                     "[ ] speed",
                                     "r recover"};
   if (const OutputView* const output = session.chosenOutput()) {
-    texts.insert(texts.end(), {"n next output", "t switch " + shortName(output->name, kShortName)});
+    const std::string name = shortName(output->name, kShortName);
+    texts.push_back("n next output");
+    // The driver refuses to switch an output that a position switches.
+    texts.push_back(output->axis.empty() ? "t switch " + name : "u no longer by position: " + name);
   }
   std::vector<Row> rows = packed(texts, columns);
   if (!session.showsHelp()) return rows;

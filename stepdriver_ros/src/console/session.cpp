@@ -63,6 +63,8 @@ std::string Call::name() const {
         return "home";
       case What::kSetOutput:
         return "switch";
+      case What::kEndCompare:
+        return "end position compare";
       case What::kHold:
         return "hold";
       case What::kResume:
@@ -76,7 +78,7 @@ std::string Call::name() const {
     }
     return "recover";
   };
-  if (what == What::kSetOutput) return output + ": " + word();
+  if (!output.empty()) return output + ": " + word();
   return (axis.empty() ? "all axes" : axis) + ": " + word();
 }
 
@@ -207,6 +209,9 @@ void Session::obey(const Command& command, double now, Orders& orders) {
     case Action::kSwitchOutput:
       switchOutput(now, orders);
       break;
+    case Action::kEndCompare:
+      endCompare(now, orders);
+      break;
     case Action::kHelp:
       help_ = !help_;
       break;
@@ -278,6 +283,20 @@ void Session::switchOutput(double now, Orders& orders) {
   Call change{Call::What::kSetOutput, {}};
   change.output = chosen->name;
   change.on = !chosen->on;
+  call(std::move(change), now, orders);
+}
+
+void Session::endCompare(double now, Orders& orders) {
+  const OutputView* const chosen = chosenOutput();
+  if (chosen == nullptr) return messages_.say("the driver has no output with a name");
+  if (!driver_.live(now)) {
+    return messages_.say(chosen->name + " isn't changed: the driver's state isn't live");
+  }
+  if (chosen->axis.empty()) {
+    return messages_.say(chosen->name + " isn't changed: no position switches it");
+  }
+  Call change{Call::What::kEndCompare, {}};
+  change.output = chosen->name;
   call(std::move(change), now, orders);
 }
 

@@ -23,6 +23,7 @@ struct Call {
     kHome,
     kHomeAll,
     kSetOutput,
+    kEndCompare,
     kHold,
     kResume,
     kSpeedOverride,
@@ -147,6 +148,8 @@ class Session {
   void home(bool all, double now, Orders& orders);
   void chooseNextOutput();
   void switchOutput(double now, Orders& orders);
+  /// No position switches the chosen output any more.
+  void endCompare(double now, Orders& orders);
   void openPrompt(double now);
   void typeInto(Key key, double now, Orders& orders);
   /// Obeys a key that stops or quits, and closes what is being typed or asked.

@@ -10,14 +10,17 @@
 #include <stepdriver/Home.h>
 #include <stepdriver/HomeAxes.h>
 #include <stepdriver/Jog.h>
+#include <stepdriver/LatchActionGoal.h>
 #include <stepdriver/Microstep.h>
 #include <stepdriver/MoveActionGoal.h>
 #include <stepdriver/MoveLine.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/PathSegment.h>
+#include <stepdriver/Probe.h>
 #include <stepdriver/SetCurrent.h>
 #include <stepdriver/SetLimits.h>
+#include <stepdriver/SetOutput.h>
 #include <stepdriver/SetPosition.h>
 #include <stepdriver/SetPositionCompare.h>
 #include <stepdriver/SpeedOverride.h>
@@ -115,6 +118,8 @@ DriverTopics::DriverTopics(const std::string& node, RequestLog& log) : log_(log)
   trajectory_goal_ = handle.advertise<TrajectoryGoal>("follow_joint_trajectory/goal", 100);
   trajectory_cancel_ =
       handle.advertise<actionlib_msgs::GoalID>("follow_joint_trajectory/cancel", 100);
+  latch_goal_ = handle.advertise<LatchActionGoal>("latch/goal", 100);
+  latch_cancel_ = handle.advertise<actionlib_msgs::GoalID>("latch/cancel", 100);
   setpoints_ = handle.advertise<std_msgs::Float64MultiArray>("setpoint", 100);
   for (const std::string& axis : kAxisNames) {
     setpoint_.push_back(handle.advertise<std_msgs::Float64>(axis + "/setpoint", 100));
@@ -126,7 +131,8 @@ DriverTopics::DriverTopics(const std::string& node, RequestLog& log) : log_(log)
 bool DriverTopics::connected() const {
   const auto heard = [](const ros::Publisher& topic) { return topic.getNumSubscribers() > 0; };
   return heard(jog_) && heard(setpoints_) && heard(command_) && heard(trajectory_goal_) &&
-         heard(trajectory_cancel_) && std::all_of(setpoint_.begin(), setpoint_.end(), heard) &&
+         heard(trajectory_cancel_) && heard(latch_goal_) && heard(latch_cancel_) &&
+         std::all_of(setpoint_.begin(), setpoint_.end(), heard) &&
          std::all_of(move_goals_.begin(), move_goals_.end(), heard) &&
          std::all_of(move_cancels_.begin(), move_cancels_.end(), heard);
 }
@@ -232,6 +238,19 @@ void DriverTopics::cancelMove(std::size_t axis) {
   move_cancels_.at(axis).publish(actionlib_msgs::GoalID());
 }
 
+void DriverTopics::latch(int client, bool every) {
+  LatchActionGoal goal;
+  goal.goal.input = kInput;
+  goal.goal.edge = LatchGoal::EITHER;
+  goal.goal.every = every;
+  Request request = messageOf(client, 0U, every ? "latch of every edge" : "latch");
+  request.kind = Kind::kOther;
+  goal.goal_id.id = std::to_string(log_.begin(request));
+  latch_goal_.publish(goal);
+}
+
+void DriverTopics::cancelLatches() { latch_cancel_.publish(actionlib_msgs::GoalID()); }
+
 template <typename Service, typename Arrivals>
 bool DriverCalls::call(Request request, const std::string& service, Service& call,
                        const Arrivals& arrivals) {
@@ -308,8 +327,13 @@ bool DriverCalls::moveLine(const std::vector<std::size_t>& axes,
 
 namespace {
 
-std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size) {
+std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size, bool switches) {
   std::vector<stepdriver::PathSegment> segments(3);
+  for (std::size_t i = 1; switches && i < segments.size(); ++i) {
+    segments[i].outputs.resize(1);
+    segments[i].outputs[0].name = kPathOutput;
+    segments[i].outputs[0].on = i == 1;
+  }
   for (std::size_t i = 0; i < segments.size(); ++i) {
     for (std::size_t axis = 0; axis < axes; ++axis) {
       segments[i].end.push_back((i + axis) % 2 == 0 ? size : -size / 2.0);
@@ -321,10 +345,10 @@ std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size) {
 }  // namespace
 
 std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, double size,
-                                      bool more_follows, double velocity) {
+                                      bool more_follows, double velocity, bool switches) {
   stepdriver::FollowPath service;
   for (const std::size_t axis : axes) service.request.name.push_back(kAxisNames.at(axis));
-  service.request.segments = zigzag(axes.size(), size);
+  service.request.segments = zigzag(axes.size(), size, switches);
   service.request.relative = true;
   service.request.tolerance = 0.0005;
   service.request.velocity = velocity;
@@ -346,13 +370,40 @@ std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, doub
 }
 
 bool DriverCalls::appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
-                             bool more_follows) {
+                             bool more_follows, bool switches) {
   stepdriver::AppendPath service;
   service.request.path = path;
-  service.request.segments = zigzag(axes.size(), size);
+  service.request.segments = zigzag(axes.size(), size, switches);
   service.request.more_follows = more_follows;
   return call(requestOf(Kind::kOther, 0U, "append_path of " + shown(size), false), "append_path",
               service);
+}
+
+bool DriverCalls::probe(std::size_t axis, double position, bool away, bool twice, bool returns) {
+  Probe service;
+  service.request.name = {kAxisNames.at(axis)};
+  service.request.position = {position};
+  service.request.input = kInput;
+  service.request.away = away;
+  service.request.may_miss = true;
+  if (twice) {
+    service.request.second_velocity = 0.005;
+    service.request.back_off = 0.001;
+  }
+  service.request.go_back = returns;
+  Request request = requestOf(Kind::kMotion, 1U << axis,
+                              "probe " + kAxisNames.at(axis) + " " + shown(position), true);
+  return call(leadingTo(std::move(request), axis, position, false), "probe", service);
+}
+
+bool DriverCalls::setOutput(std::size_t output, bool on) {
+  SetOutput service;
+  service.request.name = kOutputs.at(output);
+  service.request.on = on;
+  Request request =
+      requestOf(Kind::kOther, 0U, "set_output " + kOutputs.at(output) + (on ? " on" : " off"));
+  request.output = OutputOrder{output, on};
+  return call(std::move(request), "set_output", service);
 }
 
 bool DriverCalls::home(std::size_t axis, bool wait) {
@@ -410,7 +461,7 @@ bool DriverCalls::setCurrent(std::size_t axis, double run, double hold) {
 
 bool DriverCalls::compare(std::size_t axis, double from, double to) {
   SetPositionCompare service;
-  service.request.output = kOutput;
+  service.request.output = kComparedOutput;
   service.request.axis = kAxisNames.at(axis);
   service.request.cam_begin = {from};
   service.request.cam_end = {to};

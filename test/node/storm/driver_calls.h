@@ -32,6 +32,9 @@ class DriverTopics {
   void cancelTrajectories();
   void moveByAction(int client, std::size_t axis, double position, bool relative);
   void cancelMove(std::size_t axis);
+  /// Positions at the edges of the input kInput.
+  void latch(int client, bool every);
+  void cancelLatches();
 
   /// Whether the node subscribes to all of them.
   bool connected() const;
@@ -54,6 +57,8 @@ class DriverTopics {
   ros::Publisher trajectory_cancel_;
   std::vector<ros::Publisher> move_goals_;
   std::vector<ros::Publisher> move_cancels_;
+  ros::Publisher latch_goal_;
+  ros::Publisher latch_cancel_;
   ros::Publisher setpoints_;
   std::vector<ros::Publisher> setpoint_;
   std::map<std::size_t, JogMessage> jogs_;              // the last message of each axis
@@ -73,11 +78,17 @@ class DriverCalls {
                 bool relative, double duration, bool wait);
   /// A zigzag of three lines around the positions of the axes.
   ///
-  /// @param velocity [m/s] 0: the highest @return its number; 0: refused
+  /// @param velocity [m/s] 0: the highest @param switches the second line has the output
+  ///   kPathOutput on
+  /// @return its number; 0: refused
   std::uint64_t followPath(const std::vector<std::size_t>& axes, double size, bool more_follows,
-                           double velocity = 0.0);
+                           double velocity = 0.0, bool switches = false);
   bool appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
-                  bool more_follows);
+                  bool more_follows, bool switches);
+  /// Until the input kInput tells of a contact, or its end.
+  bool probe(std::size_t axis, double position, bool away, bool twice, bool returns);
+  /// @param output its number in kOutputs
+  bool setOutput(std::size_t output, bool on);
   bool home(std::size_t axis, bool wait);
   bool homeAll(bool wait);
   bool microstep(std::size_t axis, int microsteps);
@@ -85,7 +96,7 @@ class DriverCalls {
   bool setPosition(std::size_t axis, double position);
   /// [A rms]
   bool setCurrent(std::size_t axis, double run, double hold);
-  /// The position of an axis switches the output kOutput: it is on between two places.
+  /// The position of an axis switches the output kComparedOutput: it is on between two places.
   bool compare(std::size_t axis, double from, double to);
   bool speedOverride(double factor);
   /// Calls of std_srvs/SetBool for an axis: enable, sleep; press_min and press_max of the rig.
@@ -108,6 +119,11 @@ class DriverCalls {
 
 extern const std::vector<std::string> kAxisNames;
 constexpr AxisSet kAllAxes = 7;
-constexpr const char* kOutput = "tool";
+constexpr const char* kComparedOutput = "tool";
+constexpr const char* kPathOutput = "pen";
+/// The third one only set_output switches.
+const std::vector<std::string> kOutputs{kComparedOutput, kPathOutput, "pump"};
+/// The carriage of x presses it.
+constexpr const char* kInput = "probe";
 
 }  // namespace stepdriver::storm

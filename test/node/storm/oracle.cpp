@@ -103,7 +103,10 @@ class Judge {
       judgeReason(request);
       if (!request.answered || !request.success) continue;
       judgeArrivals(request);
-      if (request.kind == Kind::kEmergencyStop) judgeOutput(request);
+      if (request.output) judgeOutput(request);
+      if (request.kind == Kind::kEmergencyStop) {
+        for (const std::vector<Switch>& switches : seen_.switches) judgeSafety(request, switches);
+      }
       if (!ends(request.kind)) continue;
       for (std::size_t axis = 0; axis < seen_.axes.size(); ++axis) {
         if (isOf(request, axis)) judgeEnd(request, axis);
@@ -302,7 +305,26 @@ class Judge {
         "; requests before and after it:" + requestsAround(ending.sent, clock_.whenItShows(first)));
   }
 
-  void judgeOutput(const Request& stop) {
+  void judgeOutput(const Request& request) {
+    const bool wanted = request.output->on;
+    const std::int64_t begin = clock_.earliestAt(request.sent);
+    const std::int64_t end = clock_.latestAt(*request.answered);
+    bool was_so = !wanted;  // it begins off
+    for (const Switch& each : seen_.switches.at(request.output->output)) {
+      if (each.time > end) break;
+      if (each.time <= begin) {
+        was_so = each.on == wanted;
+      } else {
+        was_so = was_so || each.on == wanted;
+      }
+    }
+    if (was_so) return;
+    broken_.push_back("after the answer of " + request.text +
+                      " the output has never had that state; requests before and after it:" +
+                      requestsAround(request.sent, *request.answered));
+  }
+
+  void judgeSafety(const Request& stop, const std::vector<Switch>& switches) {
     const std::int64_t begin = clock_.latestAt(*stop.answered);
     std::int64_t end = kForever;
     for (auto request = firstAfter(stop); request != seen_.requests.end(); ++request) {
@@ -310,10 +332,10 @@ class Judge {
       if (mayFollow(*request, stop)) end = std::min(end, clock_.earliestAt(request->sent));
     }
     const auto later =
-        std::upper_bound(seen_.switches.begin(), seen_.switches.end(), begin,
+        std::upper_bound(switches.begin(), switches.end(), begin,
                          [](std::int64_t time, const Switch& each) { return time < each.time; });
-    const bool was_on = later != seen_.switches.begin() && (later - 1)->on;
-    const std::int64_t next = later != seen_.switches.end() ? later->time : kForever;
+    const bool was_on = later != switches.begin() && (later - 1)->on;
+    const std::int64_t next = later != switches.end() ? later->time : kForever;
     const std::int64_t on_since = was_on ? begin : next;
     if (on_since >= end) return;
     broken_.push_back("the output was on after the answer of " + stop.text + ", since " +

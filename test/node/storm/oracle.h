@@ -25,7 +25,7 @@ struct Pulse {
   std::int64_t count = 0;  ///< [1/16 steps] forward less backward, with this pulse
 };
 
-/// A change of the output that a position switches.
+/// A change of an output.
 struct Switch {
   std::int64_t time = 0;  ///< [ns] on the rig's clock
   bool on = false;
@@ -47,8 +47,8 @@ struct Stall {
 struct Observation {
   std::vector<AxisFacts> axes;
   std::vector<Request> requests;
-  std::vector<std::vector<Pulse>> pulses;  ///< those of each axis
-  std::vector<Switch> switches;            ///< from off on, in their order
+  std::vector<std::vector<Pulse>> pulses;     ///< those of each axis
+  std::vector<std::vector<Switch>> switches;  ///< of each output, from off on, in their order
   std::vector<RestPoint> rests;
   std::vector<Stall> stalls;
   std::vector<ClockReading> clock;  ///< what the rig's clock showed
@@ -60,8 +60,8 @@ struct Observation {
 ///   answer of a stop or a hold there are none later than the longest deceleration and 10 %. This
 ///   ends when a newer motion can have begun: one that was requested later and that nothing forbids
 ///   any longer.
-/// - From the answer of an emergency stop until a newer recover can have come, the output that a
-///   position switches is off.
+/// - From the answer of an emergency stop until a newer recover can have come, all outputs are off.
+/// - If an answer says that an output was switched, it was so between the request and the answer.
 /// - If an answer says that a position was reached, it was reached.
 /// - The reported position is the count of the pulses.
 /// - Pulses never lead an axis beyond its soft limits. If only one request for motion comes between

@@ -40,6 +40,7 @@ class OneAxis {
     facts.max_position = 0.15;
     seen_.axes = {facts};
     seen_.pulses.resize(1);
+    seen_.switches.resize(1);
     for (std::int64_t time = kOffset; time <= 6000; time += 10) {
       const std::int64_t at = time * kMs;
       seen_.clock.push_back({at, at - kOffset * kMs, at});
@@ -71,7 +72,7 @@ class OneAxis {
       reading.rig = (begin - kOffset) * kMs;
     }
   }
-  void switchOutput(std::int64_t time, bool on) { seen_.switches.push_back({time * kMs, on}); }
+  void switchOutput(std::int64_t time, bool on) { seen_.switches[0].push_back({time * kMs, on}); }
   std::size_t broken() const { return brokenPromises(seen_).size(); }
 
  private:
@@ -113,6 +114,29 @@ TEST(Oracle, LetsNoOutputBeOnFromAnEmergencyStopToTheNextRecover) {
     axis.ask(requestOf(Kind::kRecover, 4000, 4010));
     axis.switchOutput(on, true);
     EXPECT_EQ(axis.broken(), on > 3000 ? 0U : 1U) << on;
+  }
+}
+
+TEST(Oracle, HoldsAnAnsweredSwitchAgainstTheOutput) {
+  for (const bool on : {true, false}) {
+    // It begins off, and is switched on at 2050 and off at 2150.
+    for (const std::int64_t sent : {2900, 3000, 3100}) {
+      OneAxis axis;
+      Request request = requestOf(Kind::kOther, sent, sent + 60);
+      request.output = OutputOrder{0, on};
+      axis.ask(request);
+      axis.switchOutput(2050, true);
+      axis.switchOutput(2150, false);
+      const bool was_so = on ? sent != 2900 : true;
+      EXPECT_EQ(axis.broken(), was_so ? 0U : 1U) << on << " at " << sent;
+    }
+    OneAxis axis;
+    Request request = requestOf(Kind::kOther, 3070, 3100);
+    request.output = OutputOrder{0, on};
+    axis.ask(request);
+    axis.switchOutput(2050, true);
+    axis.switchOutput(2150, false);
+    EXPECT_EQ(axis.broken(), on ? 0U : 1U);
   }
 }
 

@@ -45,6 +45,12 @@ struct Reach {
   bool relative = false;  ///< they count from where the axis rests before it
 };
 
+/// How a request switches an output.
+struct OutputOrder {
+  std::size_t output = 0;
+  bool on = false;
+};
+
 /// A request and its result. Times are in nanoseconds of CLOCK_MONOTONIC.
 struct Request {
   int client = 0;
@@ -61,6 +67,7 @@ struct Request {
   std::string message;
   std::vector<Arrival> arrivals;
   std::vector<Reach> reaches;  ///< one for each of its axes. Empty: that isn't known
+  std::optional<OutputOrder> output = {};
 };
 
 std::int64_t steadyNow();

@@ -96,13 +96,19 @@ void StormClient::sendMotion() {
       },
       [&] {
         const auto axes = someAxes();
-        std::uint64_t path = calls_.followPath(axes, between(-kFarthest, kFarthest) / 3.0, true);
+        const bool switches = chance(0.5);
+        std::uint64_t path =
+            calls_.followPath(axes, between(-kFarthest, kFarthest) / 3.0, true, 0.0, switches);
         while (path != 0 && chance(0.7)) {
           const bool more = chance(0.7);
           pause(0.3);
-          if (!calls_.appendPath(path, axes, between(-kFarthest, kFarthest) / 3.0, more)) path = 0;
+          const double size = between(-kFarthest, kFarthest) / 3.0;
+          if (!calls_.appendPath(path, axes, size, more, switches)) path = 0;
           if (!more) path = 0;
         }
+      },
+      [&] {
+        calls_.probe(chance(0.8) ? 0 : axis, anyPosition(), chance(0.5), chance(0.5), chance(0.5));
       },
       [&] { jog(); },
       [&] { streamSetpoints(); },
@@ -126,15 +132,20 @@ void StormClient::sendSetting() {
     };
     calls_.setLimits(axis, or_configured(0.01, 0.04), or_configured(0.02, 0.2),
                      or_configured(0.05, 3.0));
-  } else if (what < 0.62) {
+  } else if (what < 0.58) {
     const double from = anyPosition();
     calls_.compare(axis, from, from + between(0.001, 0.02));
-  } else if (what < 0.72) {
-    calls_.setPosition(axis, anyPosition());
+  } else if (what < 0.66) {
+    const std::size_t last = kOutputs.size() - 1;
+    calls_.setOutput(std::uniform_int_distribution<std::size_t>(0, last)(random_), chance(0.6));
+  } else if (what < 0.73) {
+    topics_.latch(number_, chance(0.5));
   } else if (what < 0.78) {
+    calls_.setPosition(axis, anyPosition());
+  } else if (what < 0.82) {
     const double run = between(0.2, kHighestCurrent);
     calls_.setCurrent(kWithRegisters, run, between(0.1, run));
-  } else if (what < 0.88) {
+  } else if (what < 0.9) {
     calls_.microstep(chance(0.5) ? 0 : 2, chance(0.5) ? 16 : 8);
   } else {
     pressSwitch();
@@ -175,6 +186,8 @@ void StormClient::sendEnding() {
     calls_.trigger(Kind::kRecover, kAllAxes, "recover");
   } else if (what < 0.92) {
     topics_.cancelMove(axis);
+  } else if (what < 0.95) {
+    topics_.cancelLatches();
   } else {
     topics_.cancelTrajectories();
   }

@@ -53,7 +53,13 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node) {
   node.set("motor_power/off_delay_ms", 50.0);
   node.set("motor_power/feedback/pin", "motor_power_feedback");
   node.set("motor_power/feedback/active_level", "high");
-  node.set(std::string("outputs/") + kOutput + "/pin", kOutput);
+  for (const std::string& output : kOutputs) node.set("outputs/" + output + "/pin", output);
+  const std::string input = std::string("inputs/") + kInput + "/";
+  node.set(input + "pin", kInput);
+  node.set(input + "active_level", "high");
+  node.set("simulation/" + input + "axis", "x");
+  node.set("simulation/" + input + "from_mm", 30.0);
+  node.set("simulation/" + input + "to_mm", 40.0);
   const auto pins = {"step", "dir", "ms1", "ms2", "ms3", "sleep", "reset"};
   std::vector<AxisFacts> facts;
   facts.push_back(setUpAxis(node, "x", pins, {100.0, 250.0, 0.0}));

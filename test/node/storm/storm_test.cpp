@@ -3,6 +3,7 @@
 #include <ros/param.h>
 #include <ros/subscriber.h>
 #include <stepdriver/AxisStates.h>
+#include <stepdriver/LatchedPositions.h>
 #include <stepdriver/RigReport.h>
 
 #include <algorithm>
@@ -102,6 +103,9 @@ class Storm : public testing::Test {
     node_.start();
     topics_.emplace(node_.name(), log_);
     states_.emplace(node_.full("axis_states"));
+    latched_positions_ = ros::NodeHandle().subscribe<LatchedPositions>(
+        node_.full("latched_positions"), 100,
+        [this](const LatchedPositions::ConstPtr& /*edge*/) { ++latched_; });
     clock_watch_.emplace(node_.full("rig/report"));
     ender_.emplace(node_.name(), kClients, log_);
     ASSERT_TRUE(waitUntil([&] { return topics_->connected() && states_->count() > 0; }));
@@ -121,6 +125,7 @@ class Storm : public testing::Test {
       node_.process().signal(SIGKILL);
     }
     for (std::thread& thread : threads_) thread.join();
+    latched_positions_.shutdown();
   }
 
   void storm();
@@ -159,6 +164,8 @@ class Storm : public testing::Test {
   std::atomic<Weather> weather_{Weather::kCalm};
   std::deque<StormClient> clients_;
   std::deque<std::thread> threads_;
+  std::atomic<std::uint64_t> latched_{0};
+  ros::Subscriber latched_positions_;
   std::vector<double> memory_;  // [MB] of the node at each calm
   Observation seen_;
   bool failed_ = false;
@@ -281,22 +288,25 @@ void Storm::end() {
 void Storm::judge() {
   const auto trace = node_test::readVcd(trace_);
   for (const AxisFacts& axis : seen_.axes) seen_.pulses.push_back(pulsesOf(trace, axis.name));
-  bool on = false;
-  for (const auto& edge : trace.at(std::string("outputs/") + kOutput).edges) {
-    if (std::exchange(on, edge.level) != edge.level) seen_.switches.push_back({edge.time_ns, on});
+  std::size_t switches = 0;
+  for (const std::string& output : kOutputs) {
+    bool on = false;
+    std::vector<Switch>& changes = seen_.switches.emplace_back();
+    for (const auto& edge : trace.at("outputs/" + output).edges) {
+      if (std::exchange(on, edge.level) != edge.level) changes.push_back({edge.time_ns, on});
+    }
+    switches += changes.size();
   }
   seen_.requests = log_.requests();
   seen_.stalls = stall_watch_.stalls();
   std::size_t pulses = 0;
   for (const auto& each : seen_.pulses) pulses += each.size();
   std::printf(
-      "storm: seed %llu, %zu requests, %zu pulses, %zu switches, %zu calms, %zu stalls, %zu "
-      "readings of the "
-      "rig's "
-      "clock, %.1f to %.1f MB\n",
-      static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, seen_.switches.size(),
-      seen_.rests.size(), seen_.stalls.size(), seen_.clock.size(),
-      *std::min_element(memory_.begin(), memory_.end()),
+      "storm: seed %llu, %zu requests, %zu pulses, %zu switches, %llu latched edges, %zu calms, "
+      "%zu stalls, %zu readings of the rig's clock, %.1f to %.1f MB\n",
+      static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, switches,
+      static_cast<unsigned long long>(latched_.load()), seen_.rests.size(), seen_.stalls.size(),
+      seen_.clock.size(), *std::min_element(memory_.begin(), memory_.end()),
       *std::max_element(memory_.begin(), memory_.end()));
   const auto broken = brokenPromises(seen_);
   for (std::size_t i = 0; i < std::min(broken.size(), kMostReported); ++i) fail(broken[i]);
