@@ -96,6 +96,7 @@ class TmcReader {
       }
       return false;
     }
+    // A homing on SPI chops as it must.
     if (!is_on_spi_) refuseUnlessDetected("stall_threshold", config);
     config.stall.emplace();
     config.stall->threshold = threshold;
@@ -103,23 +104,24 @@ class TmcReader {
     return reader_.issues().size() == before;
   }
 
-  /// In StealthChop, by StallGuard4.
+  /// In StealthChop by StallGuard4, on SPI in SpreadCycle by StallGuard2.
   void refuseUnlessDetected(const char* key, const TmcConfig& config) {
-    if (tmc::modelOf(chip_.name) != tmc::Model::kTmc2209) {
+    if (!tmc::detectsStalls(tmc::modelOf(chip_.name))) {
       reader_.contradiction(
-          key, fmt::format("is {}, but is only for the TMC2209 and TMC2226", reader_.shown(key)));
+          key, fmt::format("is {}, but the {} detects no stalls", reader_.shown(key), chip_.title));
     }
-    if (config.mode == ChopperMode::kSpreadCycle) {
-      reader_.contradiction(key,
-                            fmt::format("is {}, but the chip detects stalls in stealthchop only",
-                                        reader_.shown(key)));
+    const ChopperMode mode = is_on_spi_ ? ChopperMode::kSpreadCycle : ChopperMode::kStealthChop;
+    if (config.mode != mode) {
+      reader_.contradiction(
+          key, fmt::format("is {}, but the chip detects stalls in {} only", reader_.shown(key),
+                           is_on_spi_ ? "spreadcycle" : "stealthchop"));
     }
   }
 
   /// Its speed is read by readTmcSpeeds().
   void readStallFault(TmcConfig& config) {
     constexpr const char* kThreshold = "stall_fault_threshold";
-    const tmc::Thresholds range = tmc::stallThresholdsOf(tmc::Model::kTmc2209);
+    const tmc::Thresholds range = tmc::stallThresholdsOf(tmc::modelOf(chip_.name));
     const int threshold = reader_.integer(kThreshold, range.least, range.most, 0);
     if (!reader_.has(kThreshold)) return;
     refuseUnlessDetected(kThreshold, config);

@@ -256,6 +256,7 @@ std::uint32_t chopconfOf(const Settings& settings, int microsteps, bool on) {
 
 std::uint32_t gconfOf(const Settings& settings) {
   if (isOnSpi(settings.model)) {
+    if (settings.stall_above > 0.0) return gconfForStallOnSpi();
     return kGconfErrorsOnDiag0 | (settings.spread_cycle ? 0 : kGconfStealthChopOnSpi);
   }
   return kGconfUartPin | kGconfMicrostepsByMres | kGconfFilter |
@@ -288,8 +289,8 @@ std::vector<RegisterValue> setUpOnSpi(const Settings& settings, int microsteps) 
       {kIholdIrun, currentsOf(settings.current), false},
       {kTpowerdown, powerDownOf(settings.hold_delay, settings.model), false},
       {kTpwmthrs, thresholdOf(settings.spread_cycle_above, settings.model), false},
-      {kTcoolthrs, 0, false},
-      {kCoolconfOnSpi, 0, false},
+      {kTcoolthrs, thresholdOf(settings.stall_above, settings.model), false},
+      {kCoolconfOnSpi, coolconfOf(settings.stall_threshold), false},
       {kPwmconf, is_5160 ? kPwmconf5160 : kPwmconf2130, false},
   };
   if (is_5160) {

@@ -154,8 +154,8 @@ struct Settings {
   double spread_cycle_above = 0.0;  ///< [full steps/s] 0: at no speed
   bool interpolate = true;
   bool both_edges = false;
-  int stall_threshold = 0;   ///< SGTHRS, for stalls in any motion
-  double stall_above = 0.0;  ///< [full steps/s] 0: at no speed
+  int stall_threshold = 0;   ///< SGTHRS, or SGT of a chip on SPI, for stalls in any motion
+  double stall_above = 0.0;  ///< [full steps/s] 0: at no speed. On SPI only with spread_cycle
 };
 
 /// IHOLD_IRUN of these currents.

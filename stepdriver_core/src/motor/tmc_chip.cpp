@@ -211,8 +211,14 @@ bool TmcChip::isStall(std::uint32_t load) const {
   return tmc::isStall(settings_.model, load, config().stall->threshold);
 }
 
+bool TmcChip::measuresLoad() const {
+  if (tmc::isOnSpi(settings_.model)) return settings_.spread_cycle;
+  return tmc::detectsStalls(settings_.model);
+}
+
 bus::RegisterJob TmcChip::sampleLoad() const {
-  return jobOf({sample(tmc::kSgResult), sample(tmc::kTstep), sample(tmc::kDrvStatus)});
+  const std::uint8_t load = tmc::loadRegisterOf(settings_.model);
+  return jobOf({sample(load), sample(tmc::kTstep), sample(tmc::kDrvStatus)});
 }
 
 bus::RegisterJob TmcChip::disarmStall() const {
@@ -221,11 +227,13 @@ bus::RegisterJob TmcChip::disarmStall() const {
 
 bus::RegisterJob TmcChip::endStall() const {
   const std::uint32_t currents = tmc::currentsOf(effective(settings_.current));
+  const auto threshold = [this](double speed) { return tmc::thresholdOf(speed, settings_.model); };
   if (tmc::isOnSpi(settings_.model)) {
     return jobOf({write(tmc::kTcoolthrs, 0), writeBack(tmc::kGconf, tmc::gconfOf(settings_)),
-                  write(tmc::kCoolconfOnSpi, 0), write(tmc::kIholdIrun, currents)});
+                  write(tmc::kCoolconfOnSpi, tmc::coolconfOf(settings_.stall_threshold)),
+                  write(tmc::kIholdIrun, currents),
+                  write(tmc::kTcoolthrs, threshold(settings_.stall_above))});
   }
-  const auto threshold = [this](double speed) { return tmc::thresholdOf(speed, settings_.model); };
   return jobOf({write(tmc::kTcoolthrs, 0),
                 write(tmc::kSgthrs, static_cast<std::uint32_t>(settings_.stall_threshold)),
                 write(tmc::kTpwmthrs, threshold(settings_.spread_cycle_above)),
@@ -329,11 +337,16 @@ std::string TmcChip::takeSample(const bus::RegisterDone& done, double position, 
   if (done.failure != bus::Failure::kNone) return "";
   const tmc::Status status = tmc::statusOf(settings_.model, done.values.back());
   stalled_samples_ = isStalled(done, status) ? stalled_samples_ + 1 : 0;
-  if (status.standstill || !status.stealth_chop.value_or(false)) return "";
-  state_.stall_guard = static_cast<int>(done.values.front());
+  if (!measures(status)) return "";
+  state_.stall_guard = status.stall_guard.value_or(static_cast<int>(done.values.front()));
   state_.stall_guard_position = position;
   state_.stall_guard_velocity = velocity;
   return stalled_samples_ < kStalledSamples ? "" : stallFault();
+}
+
+bool TmcChip::measures(const tmc::Status& status) const {
+  const bool is_stealthy = status.stealth_chop.value_or(!settings_.spread_cycle);
+  return !status.standstill && is_stealthy != tmc::isOnSpi(settings_.model);
 }
 
 // With DIAG the chip says it itself.
@@ -341,7 +354,7 @@ bool TmcChip::isStalled(const bus::RegisterDone& done, const tmc::Status& status
   if (!config().stall_fault || motor_.fault) return false;
   const bool is_fast =
       done.values.at(1) <= tmc::thresholdOf(settings_.stall_above, settings_.model);
-  return is_fast && !status.standstill && status.stealth_chop.value_or(false) &&
+  return is_fast && measures(status) &&
          tmc::isStall(settings_.model, done.values.front(), settings_.stall_threshold);
 }
 
@@ -380,8 +393,8 @@ void TmcChip::takeStatus(const tmc::Status& status) {
   state_.open_load_a = status.open_load_a;
   state_.open_load_b = status.open_load_b;
   state_.at_least_celsius = status.at_least_celsius;
-  // On SPI it is measured in SpreadCycle only. At rest it keeps its value.
-  if (status.stall_guard && !state_.stealth_chop && !status.standstill) {
+  // At rest it keeps its value. Samples have its place, too.
+  if (status.stall_guard && measures(status) && !measuresLoad()) {
     state_.stall_guard = status.stall_guard;
   }
 }

@@ -34,7 +34,7 @@ class TmcChip {
   /// What the chip says of itself. @param audits MSCNT, too.
   bus::RegisterJob poll(bool audits = false) const;
   /// SG_RESULT can be read in motion, with sampleLoad().
-  bool measuresLoad() const { return settings_.model == driver::tmc::Model::kTmc2209; }
+  bool measuresLoad() const;
   /// SG_RESULT, and how the chip chops. @pre measuresLoad()
   bus::RegisterJob sampleLoad() const;
   /// The scale of currents [A rms] in the range that is configured.
@@ -149,6 +149,8 @@ class TmcChip {
   void noteCurrents();
   /// With the hold current of the idle timeout, if that is over.
   driver::tmc::CurrentScale effective(driver::tmc::CurrentScale scale) const;
+  /// It measures its load: it moves, and chops as it must for that.
+  bool measures(const driver::tmc::Status& status) const;
   bool isStalled(const bus::RegisterDone& done, const driver::tmc::Status& status) const;
   driver::tmc::CurrentScale stallScale() const;
   double currentOf(int scale) const;  // [A rms]

@@ -141,7 +141,7 @@ TEST(ReadTmc, TakesStallsInAnyMotionAsAFault) {
   put(axis, "driver", std::string("tmc2208"));
   put(axis, "tmc/address", 0);
   EXPECT_EQ(issuesOfX(axis),
-            lineOfX("tmc/stall_fault_threshold", "is 60, but is only for the TMC2209 and TMC2226"));
+            lineOfX("tmc/stall_fault_threshold", "is 60, but the TMC2208 detects no stalls"));
 }
 
 TEST(ReadTmc, TakesALowerCurrentForTheIdleTimeout) {
@@ -255,8 +255,16 @@ TEST(ReadTmc, TakesAChipOnSpi) {
   EXPECT_EQ(readX(axis).tmc->stall->threshold, -64);
   expectIssues(axis, {{"tmc/stall_threshold", -65, "is -65, but must be from -64 to 63"},
                       {"tmc/stall_threshold", 64, "is 64, but must be from -64 to 63"}});
-  put(axis, "tmc/stall_fault_threshold", 10);
-  EXPECT_NE(issuesOfX(axis).front().find("is only for the TMC2209 and TMC2226"), std::string::npos);
+  put(axis, "tmc/stall_fault_above_mm_s", 20.0);
+  put(axis, "tmc/stall_fault_threshold", -64);
+  EXPECT_EQ(readX(axis).tmc->stall_fault->threshold, -64);
+  expectIssues(axis, {{"tmc/stall_fault_threshold", -65, "is -65, but must be from -64 to 63"},
+                      {"tmc/stall_fault_threshold", 64, "is 64, but must be from -64 to 63"}});
+  put(axis, "tmc/stall_fault_threshold", 63);
+  EXPECT_EQ(readX(axis).tmc->stall_fault->threshold, 63);
+  drop(axis, "tmc/mode");
+  EXPECT_EQ(issuesOfX(axis), lineOfX("tmc/stall_fault_threshold",
+                                     "is 63, but the chip detects stalls in spreadcycle only"));
   axis = spiAxis("tmc5160");
   put(axis, "tmc/address", 1);
   EXPECT_NE(issuesOfX(axis).front().find("tmc/address: is not known; known here: "),

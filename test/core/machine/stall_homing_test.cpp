@@ -353,13 +353,14 @@ TEST_P(StallHoming, FailsIfTheChipIsLost) {
   EXPECT_TRUE(contains(machine.x().state().fault, cause)) << machine.x().state().fault;
 }
 
-// A machine that meets something in a move, by DIAG or by the UART.
-class StallFault : public ::testing::TestWithParam<bool> {
+// A machine that meets something in a move, by DIAG or by the bus.
+class StallFault : public ::testing::TestWithParam<Way> {
  protected:
   static config::AxisConfig axis() {
-    config::AxisConfig config = stallAxis({"tmc2209", GetParam()});
+    config::AxisConfig config = stallAxis(GetParam());
+    if (GetParam().isOnSpi()) config.tmc->mode = config::ChopperMode::kSpreadCycle;
     config.tmc->stall_fault.emplace();
-    config.tmc->stall_fault->threshold = 60;
+    config.tmc->stall_fault->threshold = GetParam().isOnSpi() ? -60 : 60;
     config.tmc->stall_fault->above = 150.0;  // 0.03 m/s
     return config;
   }
@@ -378,8 +379,7 @@ TEST_P(StallFault, EndsTheMotionWithItsCause) {
   EXPECT_LT(waited, 0.3);
   EXPECT_EQ(x.wait(move).end, axis::MoveEnd::kFault);
   machine.bench.machine->advance(0.1);
-  EXPECT_TRUE(contains(x.state().fault, "the TMC2209 reports that the motor has stalled"))
-      << x.state().fault;
+  EXPECT_TRUE(contains(x.state().fault, " reports that the motor has stalled")) << x.state().fault;
   EXPECT_TRUE(contains(x.state().remedy, "what blocks the motor")) << x.state().remedy;
   EXPECT_FALSE(x.state().position_valid);
   machine.bench.machine->recover();
@@ -414,12 +414,26 @@ TEST_P(StallFault, IsWatchedForAfterAHoming) {
   WithWall machine(axis(), 0.2);
   const HomingResult result = machine.x().home();
   ASSERT_EQ(result.end, HomingEnd::kHomed) << result.message;
-  EXPECT_EQ(machine.bench.rig.registerOf("x", kStallBelow), 60U);
-  EXPECT_EQ(machine.bench.rig.registerOf("x", kStallAbove), 313U);
+  machine.expectRegistersAsBefore();
+  if (GetParam().isOnSpi()) {
+    EXPECT_EQ(machine.bench.rig.registerOf("x", kStallOnSpi), 0x440000U) << "-60 in 7 bits";
+    EXPECT_EQ(machine.bench.rig.registerOf("x", kGlobalConfiguration) & 0x184U, 0x180U);
+  } else {
+    EXPECT_EQ(machine.bench.rig.registerOf("x", kStallBelow), 60U);
+  }
+  // A TMC2130 has a faster clock.
+  const bool is_2130 = std::string(GetParam().driver) == "tmc2130";
+  EXPECT_EQ(machine.bench.rig.registerOf("x", kStallAbove), is_2130 ? 344U : 313U);
 }
 
-INSTANTIATE_TEST_SUITE_P(, StallFault, ::testing::Bool(),
-                         [](const auto& way) { return way.param ? "ByDiag" : "ByTheUart"; });
+const std::vector<Way> kWays = {{"tmc2209", true},  {"tmc2209", false}, {"tmc2130", true},
+                                {"tmc2130", false}, {"tmc5160", true},  {"tmc5160", false}};
+
+std::string nameOf(const ::testing::TestParamInfo<Way>& way) {
+  return std::string(way.param.driver) + (way.param.has_diag ? "ByDiag" : "ByTheBus");
+}
+
+INSTANTIATE_TEST_SUITE_P(, StallFault, ::testing::ValuesIn(kWays), nameOf);
 
 // What DIAG reports is named by the registers.
 TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
@@ -435,14 +449,7 @@ TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
       << machine.x().state().fault;
 }
 
-INSTANTIATE_TEST_SUITE_P(, StallHoming,
-                         ::testing::Values(Way{"tmc2209", true}, Way{"tmc2209", false},
-                                           Way{"tmc2130", true}, Way{"tmc2130", false},
-                                           Way{"tmc5160", true}, Way{"tmc5160", false}),
-                         [](const auto& way) {
-                           return std::string(way.param.driver) +
-                                  (way.param.has_diag ? "ByDiag" : "ByTheBus");
-                         });
+INSTANTIATE_TEST_SUITE_P(, StallHoming, ::testing::ValuesIn(kWays), nameOf);
 
 }  // namespace
 }  // namespace stepdriver

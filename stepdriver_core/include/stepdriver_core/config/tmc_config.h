@@ -26,7 +26,7 @@ struct StallConfig {
 /// How a driver chip detects in any motion that its motor has stalled (StallGuard), which is a
 /// fault.
 struct StallFaultConfig {
-  int threshold = 0;   ///< 0 to 255: SG_RESULT at or below twice this is a stall
+  int threshold = 0;   ///< see StallConfig
   double above = 0.0;  ///< [full steps/s] of the motor: below this speed SG_RESULT means nothing
 };
 
