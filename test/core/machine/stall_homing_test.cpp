@@ -426,14 +426,14 @@ TEST_P(StallFault, IsWatchedForAfterAHoming) {
   EXPECT_EQ(machine.bench.rig.registerOf("x", kStallAbove), is_2130 ? 344U : 313U);
 }
 
-const std::vector<Way> kWays = {{"tmc2209", true},  {"tmc2209", false}, {"tmc2130", true},
-                                {"tmc2130", false}, {"tmc5160", true},  {"tmc5160", false}};
+const std::vector<Way> kStallWays = {{"tmc2209", true},  {"tmc2209", false}, {"tmc2130", true},
+                                     {"tmc2130", false}, {"tmc5160", true},  {"tmc5160", false}};
 
-std::string nameOf(const ::testing::TestParamInfo<Way>& way) {
+std::string nameOfWay(const ::testing::TestParamInfo<Way>& way) {
   return std::string(way.param.driver) + (way.param.has_diag ? "ByDiag" : "ByTheBus");
 }
 
-INSTANTIATE_TEST_SUITE_P(, StallFault, ::testing::ValuesIn(kWays), nameOf);
+INSTANTIATE_TEST_SUITE_P(, StallFault, ::testing::ValuesIn(kStallWays), nameOfWay);
 
 // What DIAG reports is named by the registers.
 TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
@@ -449,7 +449,7 @@ TEST(FaultOutput, OfAChipIsExplainedByItsRegisters) {
       << machine.x().state().fault;
 }
 
-INSTANTIATE_TEST_SUITE_P(, StallHoming, ::testing::ValuesIn(kWays), nameOf);
+INSTANTIATE_TEST_SUITE_P(, StallHoming, ::testing::ValuesIn(kStallWays), nameOfWay);
 
 }  // namespace
 }  // namespace stepdriver
