@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -47,6 +50,25 @@ std::vector<gpio::ChipInfo> twoChips() {
   closed.name = "gpiochip1";
   closed.error = EACCES;
   return {header, closed};
+}
+
+TEST(LinesReport, TellsWhichPwmChannelsAreThere) {
+  char folder[] = "/tmp/stepdriver-check-XXXXXX";
+  ASSERT_NE(mkdtemp(folder), nullptr);
+  const std::filesystem::path chip = std::filesystem::path(folder) / "pwmchip0";
+  std::filesystem::create_directory(chip);
+  std::ofstream(chip / "npwm") << "1\n";
+  const LinesReport report = linesReport(twoChips(),
+                                         {{"outputs/pen", "pwmchip0:0/20000000/1000000/2000000"},
+                                          {"outputs/fan", "pwmchip0:1/20000000/1000000/2000000"}},
+                                         folder);
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(report.missing, 1U);
+  EXPECT_TRUE(has(report.text, std::string("outputs/pen  pwmchip0:0  ") + folder + "  PWM"))
+      << report.text;
+  EXPECT_TRUE(has(report.text, "pwmchip0:1: ")) << report.text;
+  EXPECT_TRUE(has(report.text, "/pwmchip0/npwm reads 1, so the channel must be below that"))
+      << report.text;
 }
 
 TEST(LinesReport, TellsWhereEachLineIsAndWhoHoldsIt) {

@@ -222,6 +222,18 @@ axes:
                       "base")};
 }
 
+/// An output of a PWM chip of the kernel. @param map "pwm" or "servo"
+Node pwmOutput(const char* map, const std::string& rest) {
+  ConfigValue::Map tree = *homing().base.as<ConfigValue::Map>();
+  tree["outputs"] =
+      yaml::parse(std::string("x: {") + map + ": {chip: 0, channel: 0" + rest + "}}", "base");
+  return {map, false, readNode, tree};
+}
+
+bool isPwmOutput(const Node& node) {
+  return std::string(node.name) == "pwm" || std::string(node.name) == "servo";
+}
+
 ConfigValue scaledByRounds(const Node& node) {
   const ConfigValue steps(200);
   const ConfigValue travel(40.0);
@@ -276,6 +288,14 @@ std::vector<Parameter> parametersOf(const Node& node) {
   }
   if (std::string(node.name) == "homing") return parametersUnder("Kinds of homing", "axes/x/");
   if (std::string(node.name) == "corexy") return parametersUnder("Axes that share motors", "");
+  if (isPwmOutput(node)) {
+    const std::string map = std::string("outputs/x/") + node.name + "/";
+    std::vector<Parameter> own;
+    for (const Parameter& parameter : parametersUnder("A PWM output", "")) {
+      if (parameter.key.rfind(map, 0) == 0) own.push_back(parameter);
+    }
+    return own;
+  }
   std::vector<Parameter> all = parametersUnder("The node", "");
   for (const Parameter& parameter : parametersUnder("Outputs and inputs with a name", "")) {
     all.push_back(parameter);
@@ -384,6 +404,7 @@ TEST_P(ParametersPage, HasEveryKeyThatTheNodeTakesAndNoOther) {
     if (GetParam().name == std::string("gantry") && map != "axes/x/motors/left") continue;
     if (GetParam().name == std::string("corexy") && map != "kinematics") continue;
     if (isRegisterChip(GetParam()) && map != "axes/x/tmc") continue;
+    if (isPwmOutput(GetParam()) && map != std::string("outputs/x/") + GetParam().name) continue;
     if (GetParam().name == std::string("homing")) continue;  // see HomingKinds
     std::set<std::string> expected = on_page;
     // An axis can be of either kind, and the message about keys of both kinds says so.
@@ -446,7 +467,7 @@ TEST_P(ParametersPage, HasTheDefaultsOfTheReaders) {
     ++compared;
   }
   const bool has_few = GetParam().name == std::string("corexy") || isRegisterChip(GetParam()) ||
-                       GetParam().name == std::string("homing");
+                       isPwmOutput(GetParam()) || GetParam().name == std::string("homing");
   EXPECT_GT(compared, has_few ? -1 : 5);
 }
 
@@ -472,7 +493,9 @@ std::string nameOf(const testing::TestParamInfo<Node>& info) { return info.param
 
 INSTANTIATE_TEST_SUITE_P(Nodes, ParametersPage,
                          testing::Values(driver(false), driver(true), gantry(), corexy(), homing(),
-                                         uartChip(), spiChip(), joystickNode(), baseNode()),
+                                         uartChip(), spiChip(),
+                                         pwmOutput("pwm", ", frequency_hz: 50.0"),
+                                         pwmOutput("servo", ""), joystickNode(), baseNode()),
                          nameOf);
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "config/write_axes.h"
 #include "message_text.h"
 #include "printable.h"
+#include "pwm_line.h"
 
 namespace stepdriver::config {
 namespace {
@@ -21,6 +22,7 @@ namespace {
 constexpr Range kMostOnSeconds{1e-3, 86'400.0};
 constexpr Range kLeastTimesMs{0.0, 60'000.0};
 constexpr Range kDebouncesMs{0.0, 1000.0};
+constexpr double kServoPeriodMs = 20.0;
 
 /// YAML 1.1 takes on and off without quotes for booleans.
 const bool* flagOf(ConfigReader& reader, const char* key) {
@@ -160,10 +162,76 @@ void readCompare(ConfigReader compare, OutputConfig& output, const std::vector<A
   if (!why.empty()) compare.issue("", why);
 }
 
-OutputConfig readOutput(ConfigReader& reader, UsedLines& used) {
-  OutputConfig output;
+/// The channel of a PWM chip. @param key that of its map
+PwmLine readChannel(ConfigReader& reader, const std::string& key, ConfigReader& pwm,
+                    UsedLines& used) {
+  constexpr int kMostChips = 1'000;
+  PwmLine line;
+  line.chip = pwm.integer("chip", 0, kMostChips);
+  line.channel = pwm.integer("channel", 0, kMostChips);
+  used.add(reader.fullName(key), line.name());
+  return line;
+}
+
+std::int64_t lengthOf(double milliseconds) { return std::llround(milliseconds * 1e6); }
+
+/// @param on the key of the length while it is on
+std::string textOf(ConfigReader& pwm, const PwmLine& line, const char* on) {
+  pwm.rejectUnknown();
+  if (line.on_ns == line.off_ns) pwm.issue(on, "is the same as off: the output does nothing");
+  return line.text();
+}
+
+/// A PWM output of the kernel: each state is a part of the period.
+std::string readPwm(ConfigReader& reader, UsedLines& used) {
+  constexpr Range kFrequencies{0.1, 1e6};
+  constexpr Range kPercents{0.0, 100.0};
+  ConfigReader pwm = reader.map("pwm");
+  PwmLine line = readChannel(reader, "pwm", pwm, used);
+  const auto frequency = pwm.findNumber("frequency_hz", kFrequencies, Presence::kRequired);
+  line.period_ns = std::llround(1e9 / frequency.value_or(1.0));
+  const auto length = [&](const char* key, double fallback) {
+    return std::llround(0.01 * pwm.number(key, kPercents, fallback) *
+                        static_cast<double>(line.period_ns));
+  };
+  line.off_ns = length("off_percent", 0.0);
+  line.on_ns = length("on_percent", 100.0);
+  return textOf(pwm, line, "on_percent");
+}
+
+/// The same with 50 pulses a second, whose lengths are the two places of a servo.
+std::string readServo(ConfigReader& reader, UsedLines& used) {
+  constexpr Range kLengthsMs{0.0, kServoPeriodMs};
+  ConfigReader servo = reader.map("servo");
+  PwmLine line = readChannel(reader, "servo", servo, used);
+  line.period_ns = lengthOf(kServoPeriodMs);
+  line.off_ns = lengthOf(servo.number("off_ms", kLengthsMs, 1.0));
+  line.on_ns = lengthOf(servo.number("on_ms", kLengthsMs, 2.0));
+  return textOf(servo, line, "on_ms");
+}
+
+/// Its line, and the level of that while it is on.
+void readOutputLine(ConfigReader& reader, UsedLines& used, OutputConfig& output) {
+  for (const char* key : {"pwm", "servo"}) reader.allow(key);
+  const bool is_pwm = reader.has("pwm");
+  const bool is_servo = reader.has("servo");
+  if (is_pwm || is_servo) {
+    output.line = is_pwm ? readPwm(reader, used) : readServo(reader, used);
+    const char* const other = reader.has("pin") ? "pin" : is_pwm && is_servo ? "servo" : nullptr;
+    if (other != nullptr) {
+      reader.allow(other);
+      reader.issue(other, fmt::format("contradicts {}: an output has one of pin, pwm and servo",
+                                      reader.fullName(is_pwm ? "pwm" : "servo")));
+    }
+    return;
+  }
   output.line = readRequiredLine(reader, "pin", used);
   output.active_level = reader.oneOf("active_level", {"low", "high"}, "high") == "high";
+}
+
+OutputConfig readOutput(ConfigReader& reader, UsedLines& used) {
+  OutputConfig output;
+  readOutputLine(reader, used, output);
   output.initial = readOn(reader, "initial");
   output.at_stop = readAtStop(reader);
   output.at_fault = readOn(reader, "at_fault");
@@ -207,6 +275,29 @@ const char* wordOf(bool on) { return on ? "on" : "off"; }
 
 double millisecondsOf(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) / 1e6; }
 
+void writeLine(const OutputConfig& output, ConfigValue::Map& map) {
+  const std::optional<PwmLine> line = pwmLineOf(output.line);
+  if (!line) {
+    map["pin"] = output.line;
+    map["active_level"] = output.active_level ? "high" : "low";
+    return;
+  }
+  ConfigValue::Map channel{{"chip", line->chip}, {"channel", line->channel}};
+  if (line->period_ns == lengthOf(kServoPeriodMs)) {
+    channel["off_ms"] = millisecondsOf(line->off_ns);
+    channel["on_ms"] = millisecondsOf(line->on_ns);
+    map["servo"] = std::move(channel);
+    return;
+  }
+  const auto percentOf = [&](std::int64_t length) {
+    return 100.0 * static_cast<double>(length) / static_cast<double>(line->period_ns);
+  };
+  channel["frequency_hz"] = 1e9 / static_cast<double>(line->period_ns);
+  channel["off_percent"] = percentOf(line->off_ns);
+  channel["on_percent"] = percentOf(line->on_ns);
+  map["pwm"] = std::move(channel);
+}
+
 }  // namespace
 
 std::vector<OutputConfig> readOutputs(ConfigReader& machine, UsedLines& used,
@@ -245,13 +336,12 @@ std::vector<InputConfig> readInputs(ConfigReader& machine, UsedLines& used) {
 ConfigValue::Map writeOutputs(const std::vector<OutputConfig>& outputs) {
   ConfigValue::Map all;
   for (const OutputConfig& output : outputs) {
-    ConfigValue::Map map{{"pin", output.line},
-                         {"active_level", output.active_level ? "high" : "low"},
-                         {"initial", wordOf(output.initial)},
+    ConfigValue::Map map{{"initial", wordOf(output.initial)},
                          {"at_stop", output.at_stop ? wordOf(*output.at_stop) : "keep"},
                          {"at_fault", wordOf(output.at_fault)},
                          {"min_on_ms", millisecondsOf(output.min_on_ns)},
                          {"min_off_ms", millisecondsOf(output.min_off_ns)}};
+    writeLine(output, map);
     if (output.max_on_ns) map["max_on_s"] = static_cast<double>(*output.max_on_ns) / 1e9;
     all[output.name] = std::move(map);
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <fstream>
 
+#include "gpio/may_wait.h"
 #include "pulse/realtime.h"
 #include "start_thread.h"
 
@@ -39,6 +40,7 @@ void PulseThread::setAlarm(Nanoseconds time) {
 
 void PulseThread::run() {
   pthread_setname_np(pthread_self(), "pulse");
+  gpio::this_thread_may_wait = false;
   id_ = gettid();
   if (clock_.realtime()) {
     scheduler_error_ = askForScheduler(kRealtimePriority);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "boards.h"
+#include "gpio/pwm_backend.h"
 #include "machine/read_options.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
@@ -28,7 +29,7 @@ Hardware::Hardware(const MachineConfig& config, const std::string& name) {
   if (config.backend == GpioBackend::kSimulated) {
     simulation_ = makeSimulation(config, name);
   } else {
-    gpio_ = gpio::makeLibgpiodBackend();
+    gpio_ = gpio::withPwm(gpio::makeLibgpiodBackend(), "/sys/class/pwm");
   }
   board_count_ = config.boards.size();
   if (board_count_ != 0) boards_ = makeBoards(config.boards, backend(), clock(), !!simulation_);

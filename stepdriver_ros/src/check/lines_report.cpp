@@ -6,6 +6,8 @@
 #include <map>
 #include <utility>
 
+#include "gpio/pwm_channel.h"
+#include "pwm_line.h"
 #include "stepdriver_core/error.h"
 #include "table.h"
 
@@ -132,12 +134,20 @@ std::string chipsText(const std::vector<gpio::ChipInfo>& chips) {
 }
 
 LinesReport linesReport(const std::vector<gpio::ChipInfo>& chips,
-                        const std::vector<NamedLine>& lines) {
+                        const std::vector<NamedLine>& lines, const std::string& pwm_folder) {
   LinesReport report;
   Reasons reasons;
   std::map<std::string, std::string> users;  // place -> pin
   std::vector<std::vector<std::string>> rows = {{"pin", "line", "found at", "state"}};
   for (const auto& [pin, line] : lines) {
+    if (const auto pwm = pwmLineOf(line)) {
+      const std::string why = gpio::PwmChannel::whyMissing(pwm_folder, *pwm);
+      rows.push_back({pin, pwm->name(), why.empty() ? pwm_folder : "not found", "PWM"});
+      if (why.empty()) continue;
+      reasons.add(pwm->name(), why);
+      ++report.missing;
+      continue;
+    }
     try {
       const gpio::LineAddress address = gpio::findLine(chips, line);
       const gpio::LineInfo& info = chips[address.chip].lines[address.offset];

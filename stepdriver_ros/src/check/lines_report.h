@@ -26,8 +26,10 @@ struct LinesReport {
   std::size_t missing = 0;  ///< lines that aren't available
 };
 
+/// @param pwm_folder with the PWM chips of the kernel.
 LinesReport linesReport(const std::vector<gpio::ChipInfo>& chips,
-                        const std::vector<NamedLine>& lines);
+                        const std::vector<NamedLine>& lines,
+                        const std::string& pwm_folder = "/sys/class/pwm");
 
 /// Only the chips.
 std::string chipsText(const std::vector<gpio::ChipInfo>& chips);

@@ -197,6 +197,69 @@ TEST(ReadIo, RefusesAnOutputThatMayNotBeOnForLongIfItsSafeStateIsOn) {
                   "output can't stay on for longer than it may"});
 }
 
+ConfigValue machineWithPwm(const std::string& kind) {
+  ConfigValue machine = mapOf({});
+  put(machine, "outputs/pen/" + kind + "/chip", 2);
+  put(machine, "outputs/pen/" + kind + "/channel", 1);
+  return machine;
+}
+
+TEST(ReadIo, ReadsPwmOutputsAndServos) {
+  ConfigValue servo = machineWithPwm("servo");
+  EXPECT_EQ(Read(servo).outputs.at(0).line, "pwmchip2:1/20000000/1000000/2000000");
+  put(servo, "outputs/pen/servo/off_ms", 0.5);
+  put(servo, "outputs/pen/servo/on_ms", 2.5);
+  EXPECT_EQ(Read(servo).outputs.at(0).line, "pwmchip2:1/20000000/500000/2500000");
+  ConfigValue pwm = machineWithPwm("pwm");
+  put(pwm, "outputs/pen/pwm/frequency_hz", 1000.0);
+  EXPECT_EQ(Read(pwm).outputs.at(0).line, "pwmchip2:1/1000000/0/1000000");
+  put(pwm, "outputs/pen/pwm/on_percent", 30.0);
+  put(pwm, "outputs/pen/pwm/off_percent", 2.5);
+  const Read read(pwm);
+  EXPECT_EQ(linesOf(read.issues), Lines());
+  EXPECT_EQ(read.outputs.at(0).line, "pwmchip2:1/1000000/25000/300000");
+  EXPECT_TRUE(read.outputs.at(0).level(true));
+}
+
+TEST(ReadIo, WritesPwmOutputsAndServosAsTheyAreRead) {
+  for (const char* const line :
+       {"pwmchip0:0/20000000/1000000/2000000", "pwmchip7:3/1000000/25000/300000",
+        "pwmchip0:1/1000/0/1", "pwmchip0:1/10000000000/1/9999999999", "pwmchip0:1/3333/1111/7"}) {
+    OutputConfig output;
+    output.name = "pen";
+    output.line = line;
+    const Read read(mapOf({{"outputs", writeOutputs({output})}}));
+    EXPECT_EQ(linesOf(read.issues), Lines());
+    EXPECT_EQ(read.outputs.at(0).line, line);
+  }
+}
+
+TEST(ReadIo, RefusesWhatAPwmOutputCannotBe) {
+  ConfigValue machine = machineWithPwm("pwm");
+  EXPECT_EQ(linesOf(Read(machine).issues),
+            Lines{"/outputs/pen/pwm/frequency_hz: is missing; it must be a number from 0.1 to "
+                  "1000000"});
+  for (const double wrong : {0.0, 0.09, 1.1e6}) {
+    put(machine, "outputs/pen/pwm/frequency_hz", wrong);
+    EXPECT_EQ(Read(machine).issues.size(), 1U) << wrong;
+  }
+  put(machine, "outputs/pen/pwm/frequency_hz", 50.0);
+  put(machine, "outputs/pen/pwm/on_percent", 0.0);
+  EXPECT_EQ(linesOf(Read(machine).issues),
+            Lines{"/outputs/pen/pwm/on_percent: is the same as off: the output does nothing"});
+  put(machine, "outputs/pen/pwm/on_percent", 100.0);
+  put(machine, "outputs/pen/pin", std::string("A"));
+  EXPECT_EQ(linesOf(Read(machine).issues),
+            Lines{"/outputs/pen/pin: contradicts /outputs/pen/pwm: an output has one of pin, pwm "
+                  "and servo"});
+  ConfigValue twice = machineWithPwm("servo");
+  put(twice, "outputs/lamp/servo/chip", 2);
+  put(twice, "outputs/lamp/servo/channel", 1);
+  const Lines issues = linesOf(Read(twice).issues);
+  ASSERT_EQ(issues.size(), 1U);
+  EXPECT_NE(issues[0].find("pwmchip2:1"), std::string::npos) << issues[0];
+}
+
 TEST(ReadIo, ReadsWhatItWrites) {
   OutputConfig pen{"pen", "A", false, true, false, false, 2'500'000'000, 1'500'000, 2'000'000};
   OutputConfig lamp{"lamp", "B", true, false, true, true, {}, 0, 0};
