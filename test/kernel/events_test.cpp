@@ -109,16 +109,16 @@ TEST_F(EventsOnKernel, OutputsChangeWithTheStepsOfTheirPlaces) {
   std::vector<std::int64_t> shots;
   for (std::int64_t count = 200; count <= 600; count += 100) shots.push_back(count);
   const unsigned camera = trace.line("board-0:5");
-  const std::vector<std::int64_t> ons = trace.times(camera, false);
-  const std::vector<std::int64_t> offs = trace.times(camera, true);
-  const std::int64_t worst = std::max(worstOf(of_pen, pens, seen), worstOf(ons, shots, seen));
+  const std::vector<std::int64_t> begins = trace.times(camera, false);
+  const std::vector<std::int64_t> ends = trace.times(camera, true);
+  const std::int64_t worst = std::max(worstOf(of_pen, pens, seen), worstOf(begins, shots, seen));
   EXPECT_LE(worst, kOneInstant);
-  ASSERT_EQ(offs.size(), ons.size());
-  for (std::size_t i = 0; i < ons.size(); ++i) {
-    EXPECT_LE(std::abs(offs[i] - ons[i] - kMillisecond), kOneInstant) << i;
+  ASSERT_EQ(ends.size(), begins.size());
+  for (std::size_t i = 0; i < begins.size(); ++i) {
+    EXPECT_LE(std::abs(ends[i] - begins[i] - kMillisecond), kOneInstant) << i;
   }
   std::printf("[ KERNEL   ] %zu changes of outputs within %lld ns of their steps\n",
-              of_pen.size() + ons.size(), static_cast<long long>(worst));
+              of_pen.size() + begins.size(), static_cast<long long>(worst));
 }
 
 TEST_F(EventsOnKernel, AnEmergencyStopSwitchesAnOutputOffWithinAMillisecond) {
