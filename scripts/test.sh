@@ -476,7 +476,8 @@ sanitize_core() {
 # short ones.
 slow_tests='RandomSequences|TenThousandRandomCommands|ForEachPairOfRequests|HybridWait.SpinsForLess|'\
 'RandomQueue.*BacklashJerk|RandomLines.WithAJerk|SmoothPathQueue.OfRandomLines|QueuedPath.NeedsMemory|'\
-'OfAStopARecoveryAndTwoOthers'
+'OfAStopARecoveryAndTwoOthers|AHundredThousand|AThousandContacts|AreFollowedAtTheEdgesOfAllLimits|'\
+'FollowsACircleInPieces|FindsTheSameMicrostepEachTime|KeepTheAngleWhatever'
 sanitize_core_asan() { sanitize_core asan; }
 sanitize_core_tsan() { sanitize_core tsan; }
 
