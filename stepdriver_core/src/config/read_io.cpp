@@ -289,12 +289,12 @@ void writeLine(const OutputConfig& output, ConfigValue::Map& map) {
     map["servo"] = std::move(channel);
     return;
   }
-  const auto percentOf = [&](std::int64_t length) {
+  const auto percent_of = [&](std::int64_t length) {
     return 100.0 * static_cast<double>(length) / static_cast<double>(line->period_ns);
   };
   channel["frequency_hz"] = 1e9 / static_cast<double>(line->period_ns);
-  channel["off_percent"] = percentOf(line->off_ns);
-  channel["on_percent"] = percentOf(line->on_ns);
+  channel["off_percent"] = percent_of(line->off_ns);
+  channel["on_percent"] = percent_of(line->on_ns);
   map["pwm"] = std::move(channel);
 }
 
