@@ -193,6 +193,8 @@ class Network(threading.Thread):
         super().__init__(daemon=True)
         self._to = port
         self._server = socket.create_server(("127.0.0.1", 0))
+        # rospy's threads change the default of new sockets for a while.
+        self._server.settimeout(None)
         self.port = self._server.getsockname()[1]
         self._open = threading.Event()
         self._open.set()
@@ -215,8 +217,12 @@ class Network(threading.Thread):
             try:
                 near = self._server.accept()[0]
             except OSError:
-                return
+                if self._ended:
+                    return
+                raise
             far = socket.create_connection(("127.0.0.1", self._to))
+            for one in (near, far):
+                one.settimeout(None)
             threading.Thread(target=self._pass, args=(near, far), daemon=True).start()
 
     def _pass(self, near, far):
