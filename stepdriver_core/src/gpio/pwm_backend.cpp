@@ -77,7 +77,7 @@ class PwmChip {
     const PwmChannel channel;
     std::atomic<std::uint64_t> last_order{0};
     std::atomic<std::uint64_t> wanted{0};  // the number of an order, and behind it its level
-    std::atomic<int> error{0};             // of the last length that was written
+    std::atomic<int> error{0};             // errno of the last write; 0: it succeeded
     std::uint64_t made = 0;                // that order is written, or a later one
   };
 
