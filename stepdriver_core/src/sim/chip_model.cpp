@@ -277,12 +277,10 @@ void ChipModel::checkReadiness(std::int64_t time_ns) {
   }
 }
 
-void ChipModel::write(const Configured& registers, std::int64_t time_ns) {
-  if (decoded_ != registers.microsteps) {
-    mode_changed_ns_ = time_ns;
-    checkTime(step_active_ns_, time_ns, chip_.timing.mode_hold_ns, Violation::kModeHold);
-  }
-  configure(registers);
+void ChipModel::checkWrite(const Configured& registers, std::int64_t time_ns) {
+  if (decoded_ == registers.microsteps) return;
+  mode_changed_ns_ = time_ns;
+  checkTime(step_active_ns_, time_ns, chip_.timing.mode_hold_ns, Violation::kModeHold);
 }
 
 void ChipModel::configure(const Configured& registers) {

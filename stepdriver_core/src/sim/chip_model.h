@@ -56,10 +56,10 @@ class ChipModel {
     bool outputs_on = false;
     bool both_edges = false;  ///< of STEP are steps
   };
-  /// The host has written them.
-  void write(const Configured& registers, std::int64_t time_ns);
-  /// The chip has them by itself: its power is lost, or is there again.
   void configure(const Configured& registers);
+  /// The host writes them, and they are about to be configured: its time is judged as that of the
+  /// pins. A chip that loses its power changes them by itself.
+  void checkWrite(const Configured& registers, std::int64_t time_ns);
   /// What ends a latched fault has happened.
   bool endsFault() const {
     if (chip_.fault_end == driver::FaultEnd::kReset) return inReset();

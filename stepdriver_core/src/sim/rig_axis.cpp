@@ -436,12 +436,13 @@ std::uint32_t RigAxis::tstep() const {
 void RigAxis::writeRegister(int number, std::uint32_t value, std::int64_t time_ns) {
   advance(time_ns);
   tmc_->write(number, value);
-  chip_.write(tmc_->configured(), time_ns);
+  chip_.checkWrite(tmc_->configured(), time_ns);
   takeRegisters(time_ns);
 }
 
 void RigAxis::takeRegisters(std::int64_t time_ns) {
   if (swing_) swing_->setTorque(tmc_->torque());
+  chip_.configure(tmc_->configured());
   follow({}, time_ns);
 }
 
@@ -451,14 +452,12 @@ void RigAxis::powerChip(bool has_power, std::int64_t time_ns) {
   tmc_->reset();
   chip_.powerUp();
   mendChip();
-  chip_.configure(tmc_->configured());
   takeRegisters(time_ns);
 }
 
 void RigAxis::setTrouble(const TmcTrouble& trouble, std::int64_t time_ns) {
   advance(time_ns);
   tmc_->setTrouble(trouble);
-  chip_.configure(tmc_->configured());
   takeRegisters(time_ns);
 }
 
