@@ -102,8 +102,9 @@ fuzz_python() {
     --found "$build/fuzz/found/$1-" "${options[@]}" "$src/test/fuzz/corpus/$1"
 }
 
-# course_of LOG: which inputs a run has played, and what they have reached: nothing of time and memory.
-course_of() { sed -n '/^#[0-9]/{s/ exec\/s: .* rss: [^ ]*//;p}' "$1"; }
+# course_of LOG: which inputs a run has played, and what they have reached: nothing of time and memory. A line
+# "pulse" comes only if the run has lasted for two seconds.
+course_of() { sed -n '/^#[0-9]*\tpulse/d;/^#[0-9]/{s/ exec\/s: .* rss: [^ ]*//;p}' "$1"; }
 
 # repeats LANGUAGE NAME: whether a short run is the same when it is played again.
 repeats() {

@@ -182,7 +182,7 @@ void RigAxis::follow(const std::optional<ChipModel::Pulse>& pulse, std::int64_t 
 
 void RigAxis::takePulse(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
   ++(pulse.forward ? pulses_forward_ : pulses_backward_);
-  step_interval_ns_ = last_pulse_ns_ == kForEver ? kForEver : time_ns - last_pulse_ns_;
+  if (last_pulse_ns_ != kForEver) step_interval_ns_ = time_ns - last_pulse_ns_;
   last_pulse_ns_ = time_ns;
   judge(pulse.forward, time_ns);
   for (const Side side : {Side::kMin, Side::kMax}) {
@@ -428,9 +428,11 @@ void RigAxis::measureLoad(const ChipModel::Pulse& pulse, std::int64_t time_ns) {
 }
 
 std::uint32_t RigAxis::tstep() const {
+  constexpr std::uint32_t slowest = 0xFFFFF;
+  if (!step_interval_ns_) return slowest;
   const double clocks =
-      tmc_->clock() * 1e-9 * static_cast<double>(step_interval_ns_) * chip_.microsteps();
-  return static_cast<std::uint32_t>(std::min(clocks / kFinestMode, double{0xFFFFF}));
+      tmc_->clock() * 1e-9 * static_cast<double>(*step_interval_ns_) * chip_.microsteps();
+  return static_cast<std::uint32_t>(std::min(clocks / kFinestMode, double{slowest}));
 }
 
 void RigAxis::writeRegister(int number, std::uint32_t value, std::int64_t time_ns) {

@@ -168,7 +168,7 @@ class RigAxis {
   std::optional<MotionJudge> judge_;
   bool last_forward_ = false;  // the direction of the last pulse
   std::int64_t last_pulse_ns_ = kForEver;
-  std::int64_t step_interval_ns_ = kForEver;  // between the last two pulses
+  std::optional<std::int64_t> step_interval_ns_;  // between the last two pulses
   // Since the chip has measured its load.
   std::int64_t way_ = 0;  // [microsteps of the finest mode]
   double lag_over_way_ = 0.0;
