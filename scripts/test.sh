@@ -303,6 +303,9 @@ test_kernel() {
   # On this kernel, memory may be locked.
   in_kernel -- "$build/core/test/core/pulse_thread_calls_test" --gtest_filter='*NoMemoryThatIsMissing'
   test_lines_in_kernel "$build/core"
+  # Pseudo terminals and the SPI bus of the drivers' registers.
+  in_kernel -- "$build/core/test/core/bus_tests"
+  in_kernel --spi -- "$build/core/test/kernel/spidev_test"
   test_waveform_in_kernel "$build/core"
 }
 test_lines_in_kernel() {

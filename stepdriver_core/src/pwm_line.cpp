@@ -3,9 +3,17 @@
 #include <fmt/format.h>
 
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 
+#include "stepdriver_core/gpio/lines.h"
+
 namespace stepdriver {
+
+std::int64_t PwmLine::lengthOf(std::uint16_t part) const {
+  const double share = static_cast<double>(part) / gpio::LineWrite::kWhole;
+  return off_ns + std::llround(share * static_cast<double>(on_ns - off_ns));
+}
 
 std::string PwmLine::name() const { return fmt::format("pwmchip{}:{}", chip, channel); }
 

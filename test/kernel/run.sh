@@ -18,6 +18,8 @@ standard input, and the caller's standard output and error.
                   every run has the same times. Each read of the clock takes 256 ns, and each event of
                   a trace reads it. Not for ROS: virtual time stops while a thread polls without
                   reading the clock
+  --spi           with an SPI bus on the lines of another chip, "spi": the clock is its line 0, then the line
+                  to the device, the line from it, and its chip select. It is /dev/spidev0.0
   --tmpfs FOLDER  hides FOLDER behind an empty one for the command; may be given several times
   --directory DIR working directory of the command (default: the caller's)
   --memory MB     memory of the machine (default: 512)
@@ -49,7 +51,7 @@ usage_error() {
 
 # ---- options ----
 
-chips=() tmpfs=() trace='' directory=$PWD memory=512 timeout=120 mode='' check=
+chips=() tmpfs=() spi='' trace='' directory=$PWD memory=512 timeout=120 mode='' check=
 while (($# > 0)); do
   case $1 in
     --chip | --trace | --tmpfs | --directory | --memory | --timeout)
@@ -64,6 +66,7 @@ while (($# > 0)); do
       esac
       shift 2
       ;;
+    --spi) spi=1 && shift ;;
     --time-travel) mode=time-travel=inf-cpu && shift ;;
     --check) check=1 && shift ;;
     -h | --help) usage && exit ;;
@@ -124,6 +127,11 @@ trap 'exit 143' TERM
 cp "$init" "$work/init"
 cp "$here/gpio_sim.sh" "$here/gpio_trace.sh" "$work/"
 chmod +x "$work/gpio_sim.sh"
+device_tree=()
+if [[ -n $spi ]]; then
+  dtc -q -o "$work/spi.dtb" "$here/spi.dts" || fail 125 "spi.dts couldn't be compiled"
+  device_tree=("dtb=$work/spi.dtb")
+fi
 printf '%s\0' "$@" >"$work/command"
 printf '%s' "$directory" >"$work/directory"
 GPIO_SIM=$work/gpio_sim.sh /usr/bin/env -0 >"$work/environment"
@@ -161,7 +169,7 @@ copy_err=$!
 # The kernel is several processes, so it has its own process group. If this script is killed, the kernel's
 # first process dies with it, and the others with the first.
 set -m
-TMPDIR=$memory_folder setpriv --pdeathsig KILL "$kernel" mem="${memory}M" $mode \
+TMPDIR=$memory_folder setpriv --pdeathsig KILL "$kernel" mem="${memory}M" $mode "${device_tree[@]}" \
   root=none rootfstype=hostfs rootflags=/ rw loglevel=4 console=tty0 umid=rig uml_dir="$work/uml/" \
   con=null ssl=null con0=null,fd:1 con1=null,fd:"$out" con2=null,fd:"$err" \
   init="$work/init" -- "$work" </dev/null >"$work/console" 2>&1 &

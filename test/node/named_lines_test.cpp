@@ -1,15 +1,18 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 #include <ros/ros.h>
+#include <std_msgs/Float64.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <stepdriver/IoStates.h>
 #include <stepdriver/MoveTo.h>
 #include <stepdriver/SetOutput.h>
+#include <stepdriver/SetOutputValue.h>
 #include <stepdriver/SetPosition.h>
 #include <stepdriver/SetPositionCompare.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -51,6 +54,52 @@ class NamedLines : public testing::Test {
 
   NodeUnderTest node;
 };
+
+/// An output of pulses, on the rig a line.
+class PwmOutput : public NamedLines {
+ protected:
+  PwmOutput() {
+    node.erase("outputs/pen/pin");
+    node.erase("outputs/pen/max_on_s");
+    node.set("outputs/pen/servo/chip", 0);
+    node.set("outputs/pen/servo/channel", 1);
+  }
+  SetOutputValue::Response setValue(const std::string& name, double value) {
+    SetOutputValue::Request request;
+    request.name = name;
+    request.value = value;
+    return node.call<SetOutputValue>("set_output_value", request);
+  }
+};
+
+TEST_F(PwmOutput, HasValuesByAServiceAndByATopic) {
+  node.start();
+  const Recorder<IoStates> states(node.full("io_states"));
+  const auto shows = [&](double value) {
+    return states.waitForLatest([value](const IoStates& now) {
+      return std::abs(now.output_value.at(0) - value) < 1e-4 &&
+             (now.output_on.at(0) != 0) == (value > 0.0);
+    });
+  };
+  EXPECT_EQ(setValue("pen", 0.25).message, "pen is at 0.25");
+  EXPECT_TRUE(shows(0.25));
+  EXPECT_TRUE(set("pen", true).success);
+  EXPECT_TRUE(shows(1.0));
+  const SetOutputValue::Response refused = setValue("relay", 0.5);
+  EXPECT_FALSE(refused.success);
+  expectSays(refused.message, "is one of a PWM output, and this is none");
+  EXPECT_FALSE(setValue("pen", 1.5).success);
+  ros::Publisher publisher = ros::NodeHandle().advertise<std_msgs::Float64>(node.full("outputs/pen"), 1);
+  ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() == 1; }));
+  std_msgs::Float64 message;
+  for (const double value : {0.5, 2.0, 0.75, 0.0}) {
+    message.data = value;
+    publisher.publish(message);
+    if (value <= 1.0) {
+      EXPECT_TRUE(shows(value)) << value;
+    }
+  }
+}
 
 TEST_F(NamedLines, AreSwitchedByAServiceAndShownByALatchedTopic) {
   node.start();

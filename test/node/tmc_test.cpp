@@ -4,6 +4,7 @@
 #include <stepdriver/DriverState.h>
 #include <stepdriver/Microstep.h>
 #include <stepdriver/SetCurrent.h>
+#include <stepdriver/SetStallThreshold.h>
 
 #include <cmath>
 #include <regex>
@@ -34,6 +35,14 @@ class NodeWithTmc : public NodeUnderTest {
     node.set("axes/x/tmc/address", 0);
     node.set("axes/x/tmc/sense_resistor_mohm", 110.0);
     node.set("axes/x/tmc/run_current_a", 0.8);
+  }
+
+  /// x has a driver on SPI in its place.
+  void isOnSpi() {
+    set("axes/x/driver", "tmc2130");
+    for (const char* key : {"port", "address"}) erase(std::string("axes/x/tmc/") + key);
+    set("axes/x/tmc/spi", "/dev/spidev0.0");
+    set("axes/x/tmc/mode", "spreadcycle");
   }
 
   /// It is homed by its stall, and has no switch.
@@ -135,6 +144,42 @@ TEST_F(TmcNode, ItsStallIsTunedByATool) {
   expectSays(end.output, "4: MSCNT ");
   expectSays(end.output, "4 homings ended within ");
   expectSays(end.output, "stall_phase: ");
+}
+
+// Each of the thresholds is tried by a move in both directions.
+TEST_F(TmcNode, ItsStallIsTunedOnSpiToo) {
+  const TemporaryFile picture(".svg");
+  int threshold = 0;
+  {
+    NodeWithTmc measured;
+    measured.isOnSpi();
+    measured.set("simulation/speed", 1.0);
+    // Nearly all the torque of the motor: other thresholds than the most sensitive ones are found.
+    measured.set("simulation/axes/x/motor/friction_nm", 0.25);
+    measured.start();
+    const ProgramEnd end =
+        measured.tuneStall({"--speed", "50", "--distance", "45", "-o", picture.path()});
+    ASSERT_EQ(end.code, 0) << end.output;
+    expectSays(end.output, "stall_threshold 63:");
+    std::smatch found;
+    ASSERT_TRUE(std::regex_search(end.output, found, std::regex("tmc:\n  stall_threshold: (.*)")));
+    threshold = std::stoi(found[1]);
+    EXPECT_GT(threshold, -64);
+    EXPECT_LT(threshold, 63);
+    SetStallThreshold::Request refused;
+    refused.threshold = 64;
+    expectSays(measured.call<SetStallThreshold>("x/set_stall_threshold", refused).message,
+               "must be from -64 to 63");
+  }
+  NodeWithTmc homed;
+  homed.isOnSpi();
+  homed.homesToStall(threshold);
+  homed.set("simulation/axes/x/motor/friction_nm", 0.25);
+  homed.set("simulation/axes/x/start_mm", 60.0);
+  homed.start();
+  const ProgramEnd end = homed.tuneStall({"--check", "--homings", "4"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  expectSays(end.output, "4 homings ended within ");
 }
 
 TEST_F(TmcNode, StallsAreTunedForChipsThatMeasureThemOnly) {

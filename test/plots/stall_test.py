@@ -8,7 +8,7 @@ import unittest
 
 import support
 from stepdriver_plots.errors import Undrawable
-from stepdriver_plots.stall import CYCLE, Sample, at_speed, middle_of, places_of, threshold_of
+from stepdriver_plots.stall import CYCLE, SGT, Sample, at_speed, middle_of, most_sensitive, places_of, threshold_of
 
 
 def program():
@@ -73,7 +73,20 @@ class StallTest(unittest.TestCase):
     def test_proposes_half_of_the_lowest_value(self):
         self.assertEqual(threshold_of([Sample(0.0, 0.05, load) for load in (400, 200, 333)]), 50)
         self.assertEqual(threshold_of([Sample(0.0, 0.05, 510)]), 127)
-        self.assertEqual(threshold_of([Sample(0.0, 0.05, 3)]), 0)
+        self.assertIsNone(threshold_of([Sample(0.0, 0.05, 3)]))
+
+    def test_finds_the_most_sensitive_threshold_on_spi(self):
+        for first in range(SGT[0], SGT[1] + 1):
+            asked = []
+
+            def lowest_load(threshold, first=first, asked=asked):
+                asked.append(threshold)
+                return 100 if threshold >= first else 99
+
+            self.assertEqual(most_sensitive(lowest_load), first)
+            self.assertLessEqual(len(asked), 8)
+            self.assertIn(first, asked)
+        self.assertIsNone(most_sensitive(lambda _: 99))
 
     def test_finds_the_middle_of_phases_around_zero(self):
         self.assertEqual(middle_of([341, 345, 349]), (345, 8))
@@ -105,9 +118,12 @@ class StallTest(unittest.TestCase):
 
     def test_refuses_what_measures_no_load(self):
         for params, given, said in (
-                ({"driver": "tmc2130"}, {}, "must be one of tmc2209, tmc2226"),
+                ({"driver": "tmc2208"}, {}, "must be one of tmc2209, tmc2226, tmc2130, tmc5160"),
                 ({"tmc": None}, {}, "with tmc/port"),
                 ({"tmc/mode": "spreadcycle"}, {}, "with stealthchop only"),
+                ({"driver": "tmc2130"}, {}, "with spreadcycle only"),
+                ({"driver": "tmc5160", "tmc/mode": "spreadcycle", "tmc/stall_fault_threshold": 0}, {},
+                 "has tmc/stall_fault_threshold"),
                 ({"homing/kind": "limit"}, {"check": True}, "must have homing/kind: stall"),
                 ({"homing/seek_speed_mm_s": None}, {}, "give the speed with --speed"),
                 ({"tmc/spreadcycle_above_mm_s": 50.0}, {}, "must be below tmc/spreadcycle_above_mm_s, 50 mm/s")):

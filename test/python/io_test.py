@@ -15,7 +15,7 @@ class OutputsAndInputs(support.MachineTest):
     }
 
     def test_have_their_states_by_name(self):
-        off = OutputState(on=False, changed=None, note="", error="", axis="", compared=0, missed=0)
+        off = OutputState(on=False, value=0.0, changed=None, note="", error="", axis="", compared=0, missed=0)
         self.assertEqual(self.machine.outputs, {"lamp": off, "pen": off})
         self.assertEqual(self.machine.inputs, {"paper": InputState(active=False, changed=None, error="")})
 
@@ -99,6 +99,8 @@ class OutputsAndInputs(support.MachineTest):
     def test_unknown_names_are_refused(self):
         with self.assertRaisesRegex(Refused, r"^there is no output pan \(outputs: .*pen.*\)$"):
             self.machine.set_output("pan", True)
+        with self.assertRaisesRegex(Refused, "the value 0.5 is one of a PWM output, and this is none"):
+            self.machine.set_output("pen", 0.5)
         with self.assertRaisesRegex(Error, "pepper"):
             self.machine.rig.press_input("pepper")
 

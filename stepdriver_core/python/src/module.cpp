@@ -457,6 +457,7 @@ void bindAxes(SessionClass& session) {
           },
           "axis"_a, "max_speed"_a, "acceleration"_a, "deceleration"_a, "jerk"_a)
       .def("set_current", command(&axis::Axis::setCurrent), "axis"_a, "run"_a, "hold"_a)
+      .def("set_stall_threshold", command(&axis::Axis::setStallThreshold), "axis"_a, "threshold"_a)
       .def(
           "limits",
           [](const Session& self, const std::string& name) {
@@ -498,7 +499,7 @@ void bindMachine(SessionClass& session) {
            [](const Session& self) {
              return self.run([](OpenMachine& open) { return open.machine().emergencyStopped(); });
            })
-      .def("set_output", command(&Machine::setOutput), "name"_a, "on"_a)
+      .def("set_output", command(&Machine::setOutput), "name"_a, "on"_a, "value"_a)
       .def("set_position_compare", &setPositionCompare, "output"_a, "axis"_a, "direction"_a,
            "cams"_a, "places"_a, "every"_a, "at_end"_a, "times"_a)
       .def("clear_position_compare", command(&Machine::clearPositionCompare), "output"_a)

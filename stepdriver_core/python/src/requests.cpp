@@ -153,8 +153,8 @@ motion::PathSegment segmentOf(const py::handle& item, const std::vector<std::str
   }
   segment.velocity = item.attr("velocity").cast<double>();
   segment.tolerance = item.attr("tolerance").cast<std::optional<double>>();
-  for (const auto& [name, on] : item.attr("outputs").cast<std::map<std::string, bool>>()) {
-    segment.outputs.push_back({name, on});
+  for (const auto& [name, value] : item.attr("outputs").cast<std::map<std::string, double>>()) {
+    segment.outputs.push_back({name, value != 0.0, value != 0.0 ? value : 1.0});
   }
   return segment;
 }

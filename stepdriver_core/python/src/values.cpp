@@ -147,9 +147,10 @@ py::dict valueOf(const motion::PathAhead& ahead) {
 }
 
 py::dict valueOf(const machine::OutputState& output) {
-  return py::dict("on"_a = output.on, "changed"_a = secondsOf(output.changed),
-                  "note"_a = output.note, "error"_a = output.error, "axis"_a = output.axis,
-                  "compared"_a = output.compared, "missed"_a = output.missed);
+  return py::dict("on"_a = output.on, "value"_a = output.value,
+                  "changed"_a = secondsOf(output.changed), "note"_a = output.note,
+                  "error"_a = output.error, "axis"_a = output.axis, "compared"_a = output.compared,
+                  "missed"_a = output.missed);
 }
 
 py::dict valueOf(const machine::InputState& input) {

@@ -196,6 +196,14 @@ class Axis:
         """
         self._session.set_current(self._name, run or 0.0, hold or 0.0)
 
+    def set_stall_threshold(self, threshold: int) -> None:
+        """Changes the threshold of stalls in any motion (StallGuard) of its driver chips on SPI, and of others with
+        ``tmc/stall_fault_threshold``, and returns when the chips have it. A homing to a stall keeps its own.
+
+        Raises Refused if it is out of range, or if no motor has such a chip.
+        """
+        self._session.set_stall_threshold(self._name, threshold)
+
     @property
     def limits(self) -> Limits:
         """The limits of its next motions."""

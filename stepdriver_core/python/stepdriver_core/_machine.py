@@ -348,15 +348,18 @@ class Machine:
         """The states of the inputs that have a name (``inputs`` in the configuration), by their names."""
         return {name: InputState(**fields) for name, fields in self._session.inputs().items()}
 
-    def set_output(self, name: str, on: bool) -> None:
+    def set_output(self, name: str, on: float) -> None:
         """Switches an output, as soon as its least times allow, and returns when its line was written.
+
+        on: True or False; of a PWM output also a number between 0 and 1: how far its pulses are from the length of
+        off to that of on.
 
         From an emergency stop, a fault of the machine or a shutdown on, each output is in its safe state.
 
         Raises Refused if there is no such output or while the outputs are in their safe states, and Error if its line
         can't be written.
         """
-        self._session.set_output(name, on)
+        self._session.set_output(name, on != 0, float(on) if on else 1.0)
 
     def set_position_compare(
         self,

@@ -20,7 +20,7 @@ class PathSegment:
     control2: Sequence[float] = ()
     velocity: float = 0.0
     tolerance: Optional[float] = None
-    outputs: Mapping[str, bool] = field(default_factory=dict)
+    outputs: Mapping[str, float] = field(default_factory=dict)
 
 
 Segment = Union[PathSegment, Sequence[float]]
@@ -32,7 +32,7 @@ def line(
     *,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, bool]] = None,
+    outputs: Optional[Mapping[str, float]] = None,
 ) -> PathSegment:
     """A straight line to ``end``.
 
@@ -40,7 +40,7 @@ def line(
     velocity: the highest speed along this segment, [m/s] or [rad/s]; None: that of the path.
     tolerance: [unit] how far the corner at its end may be rounded; None: that of the path.
     outputs: outputs with a name that are switched where the segment begins, at that time and without a stop: True is
-        on. A line to where the path already is switches them there, for example at its end.
+        on, or a number between 0 and 1 for a PWM output, see ``Machine.set_output()``. A line to where the path already is switches them there, for example at its end.
     """
     return PathSegment("line", end, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or {})
 
@@ -53,7 +53,7 @@ def arc_around(
     plane: Optional[Tuple[str, str]] = None,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, bool]] = None,
+    outputs: Optional[Mapping[str, float]] = None,
 ) -> PathSegment:
     """A circular arc around ``centre``: a full turn if both of its ends are the same. Other axes move in proportion
     to its angle.
@@ -82,7 +82,7 @@ def arc_through(
     plane: Optional[Tuple[str, str]] = None,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, bool]] = None,
+    outputs: Optional[Mapping[str, float]] = None,
 ) -> PathSegment:
     """A circular arc through ``point``, which lies between its begin and its end.
 
@@ -101,7 +101,7 @@ def bezier(
     *,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, bool]] = None,
+    outputs: Optional[Mapping[str, float]] = None,
 ) -> PathSegment:
     """A cubic Bezier curve.
 

@@ -204,6 +204,8 @@ class OutputState:
 
     on: bool
     """As its line was written last."""
+    value: float
+    """The same: 0 off, 1 on, and between them a PWM output that is on in part."""
     changed: Optional[float]
     """[s] on the clock of ``Machine.time``, when that write had ended; None: not since the start."""
     note: str

@@ -16,6 +16,7 @@
 #include "motion_outputs.h"
 #include "motor_power.h"
 #include "pulse/command.h"
+#include "stepdriver_core/gpio/lines.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::activity {
@@ -25,6 +26,7 @@ struct PinJob {
   std::uint64_t id = 0;
   int output = -1;
   bool level = false;
+  std::uint16_t part = gpio::LineWrite::kWhole;
 };
 
 /// Its result.

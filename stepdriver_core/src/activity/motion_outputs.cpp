@@ -191,9 +191,7 @@ void MotionOutputs::orderCompare(Context& context, std::size_t number, Output& o
   order->channel = static_cast<int>(compared.axis);
   order->track = track.get();
   order->changes = output.state.changes;
-  order->on = output.line.on;
-  order->changed = output.line.changed;
-  order->on_since = output.line.on_since;
+  order->written = output.line.written;
   compared.serial = order->serial;
   compared.changed = false;
   compared.origin = axis.position.origin();
@@ -261,10 +259,11 @@ pulse::Nanoseconds MotionOutputs::mayBegin(const motion::PathMarks& marks) const
   pulse::Nanoseconds earliest = 0;
   for (const motion::OutputMarks& own : marks) {
     const Output& output = outputs_.at(own.output);
-    if (own.marks.empty() || own.marks.front().on == output.line.on) continue;
+    const pulse::WrittenOutput& last = output.line.written;
+    if (own.marks.empty() || own.marks.front().setting.on == last.setting.on) continue;
     const motion::Mark& first = own.marks.front();
     const pulse::Nanoseconds free =
-        output.line.changed + (output.line.on ? output.config.min_on_ns : output.config.min_off_ns);
+        last.switched + (last.setting.on ? output.config.min_on_ns : output.config.min_off_ns);
     const pulse::Nanoseconds after = std::max<std::int64_t>(0, first.place_ns - own.lead(first));
     earliest = std::max(earliest, free - after);
   }
@@ -287,9 +286,7 @@ void MotionOutputs::order(std::uint64_t group, const std::shared_ptr<const motio
     follow.delay = delay;
     follow.begins = output.state.group != group && output.state.ended != group;
     follow.changes = output.state.changes;
-    follow.on = output.line.on;
-    follow.changed = output.line.changed;
-    follow.on_since = output.line.on_since;
+    follow.written = output.line.written;
     output.kept.push_back({follow.serial, along, marks, command, nullptr, nullptr});
   }
 }

@@ -55,9 +55,7 @@ class MotionOutputs {
   /// @{
   struct Line {
     std::string why_not;  ///< why no motion can have it now; empty: one can
-    bool on = false;
-    pulse::Nanoseconds changed = 0;  ///< clock time before which it has not changed
-    pulse::Nanoseconds on_since = 0;
+    pulse::WrittenOutput written;
   };
   void note(std::size_t output, Line line) { outputs_[output].line = std::move(line); }
   const pulse::OutputLineState& state(std::size_t output) const { return outputs_[output].state; }

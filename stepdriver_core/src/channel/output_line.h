@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "output_setting.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
@@ -15,6 +16,14 @@ struct OutputLine {
   Nanoseconds max_on = kNever;
 };
 
+/// What the writes of an output have made of it. All times are clock times.
+struct WrittenOutput {
+  OutputSetting setting;
+  Nanoseconds changed = 0;   ///< when the last write that changed something had ended
+  Nanoseconds switched = 0;  ///< the same of the last one that switched it on or off
+  Nanoseconds on_since = 0;  ///< when the last write that switched it on began
+};
+
 /// The state of such an output, as far as paths switch it.
 struct OutputLineState {
   std::uint64_t taken = 0;       ///< serial of the last command that was handled
@@ -24,9 +33,7 @@ struct OutputLineState {
   std::uint64_t ended = 0;       ///< the group of the last path that has ended
   std::uint64_t ended_made = 0;  ///< marks of that one that were made
   std::uint64_t changes = 0;     ///< how often a path has switched it
-  Nanoseconds changed = 0;       ///< clock time at which the last of these writes had ended
-  Nanoseconds on_since = 0;      ///< when the last write that switched it on began
-  bool on = false;               ///< by the last of them
+  WrittenOutput written;         ///< by the last of them
   bool due = false;              ///< a mark is still to come in the motion as it is ordered
   bool too_long = false;         ///< the last of them was by OutputLine::max_on
   /// @name What the position of an axis switches

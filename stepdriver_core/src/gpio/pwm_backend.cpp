@@ -53,11 +53,11 @@ class PwmChip {
     return outputs_.size() - 1;
   }
 
-  int write(std::size_t number, bool level) noexcept {
+  int write(std::size_t number, bool level, std::uint16_t part = LineWrite::kWhole) noexcept {
     Output& output = outputs_[number];
     const std::uint64_t order = output.last_order.fetch_add(1) + 1;
     // Of two threads that write at once, the one that ordered later counts.
-    const std::uint64_t wanted = order << 1 | (level ? 1 : 0);
+    const std::uint64_t wanted = order << kSettingBits | (level ? kHigh | part : 0U);
     std::uint64_t before = output.wanted.load();
     while (before < wanted && !output.wanted.compare_exchange_weak(before, wanted)) {
     }
@@ -70,13 +70,17 @@ class PwmChip {
   }
 
  private:
+  // What is ordered: the part, and whether it is high.
+  static constexpr std::uint64_t kHigh = 1U << 16U;
+  static constexpr unsigned kSettingBits = 17;
+
   struct Output {
     Output(const std::string& folder, const PwmLine& line, bool level)
         : channel(folder, line, level) {}
 
     const PwmChannel channel;
     std::atomic<std::uint64_t> last_order{0};
-    std::atomic<std::uint64_t> wanted{0};  // the number of an order, and behind it its level
+    std::atomic<std::uint64_t> wanted{0};  // the number of an order, and behind it what it is
     std::atomic<int> error{0};             // errno of the last write; 0: it succeeded
     std::uint64_t made = 0;                // that order is written, or a later one
   };
@@ -88,11 +92,12 @@ class PwmChip {
       std::unique_lock<std::mutex> lock(mutex_);
       for (Output& output : outputs_) {
         const std::uint64_t wanted = output.wanted.load();
-        if (wanted >> 1 == output.made) continue;
+        if (wanted >> kSettingBits == output.made) continue;
         lock.unlock();
-        output.error = output.channel.write((wanted & 1) != 0);
+        output.error =
+            output.channel.write((wanted & kHigh) != 0, static_cast<std::uint16_t>(wanted));
         lock.lock();
-        output.made = wanted >> 1;
+        output.made = wanted >> kSettingBits;
         made_.notify_all();
       }
     }
@@ -153,7 +158,7 @@ class PwmLines final : public Lines {
     for (std::size_t i = 0; i < count; ++i) {
       const Output* const output = find(writes[i].output);
       if (!output->pwm) continue;
-      const int own = output->chip->write(output->number, writes[i].level);
+      const int own = output->chip->write(output->number, writes[i].level, writes[i].part);
       if (error == 0) error = own;
     }
     return error;

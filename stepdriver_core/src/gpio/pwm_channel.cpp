@@ -86,8 +86,8 @@ PwmChannel::PwmChannel(const std::string& folder, const PwmLine& line, bool leve
   set("enable", 1);
 }
 
-int PwmChannel::write(bool level) const noexcept {
-  return writeNumber(duty_file_.c_str(), level ? line_.on_ns : line_.off_ns);
+int PwmChannel::write(bool level, std::uint16_t part) const noexcept {
+  return writeNumber(duty_file_.c_str(), level ? line_.lengthOf(part) : line_.off_ns);
 }
 
 std::string PwmChannel::whyMissing(const std::string& folder, const PwmLine& line) {

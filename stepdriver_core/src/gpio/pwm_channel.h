@@ -21,7 +21,8 @@ class PwmChannel {
 
   const PwmLine& line() const { return line_; }
   /// @return 0 or errno.
-  int write(bool level) const noexcept;
+  /// @param part see LineWrite
+  int write(bool level, std::uint16_t part) const noexcept;
 
  private:
   void exportIt() const;

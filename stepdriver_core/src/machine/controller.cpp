@@ -467,8 +467,8 @@ void Controller::endStall(const axis::AxisModel& axis, motor::TmcChip& chip) {
 
 void Controller::on(const bus::RegisterDone& done) {
   context_.register_done = done;
-  if (const auto change = requests_.current_changes.extract(done.id)) {
-    return takeCurrent(change.mapped(), done);
+  if (const auto change = requests_.setting_changes.extract(done.id)) {
+    return takeSetting(change.mapped(), done);
   }
   for (const auto& axis : context_.axes) {
     for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
@@ -512,12 +512,12 @@ void Controller::nameCause(axis::AxisModel& axis, std::size_t motor, std::string
   if (!fault.empty()) axis.fault.latch(axis.chipText(motor) + " " + fault, chip.remedy());
 }
 
-void Controller::takeCurrent(const RequestContext::CurrentChange& change,
+void Controller::takeSetting(const RequestContext::SettingChange& change,
                              const bus::RegisterDone& done) {
   axis::AxisModel& axis = *context_.axes.at(change.axis);
   motor::TmcChip& chip = *axis.motor.tmcAt(change.motor);
   const bool was_set_up = chip.isSetUp();
-  const std::string why = chip.takeCurrent(done);
+  const std::string why = chip.takeSetting(done);
   axis.motor.noteChips();
   if (why.empty()) return;
   change.call->fail({activity::Failure::Kind::kGpio,

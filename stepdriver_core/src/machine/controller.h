@@ -76,7 +76,7 @@ class Controller {
   void superviseIdle(axis::AxisModel& axis);
   void superviseChips(axis::AxisModel& axis);
   void takePoll(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done);
-  void takeCurrent(const RequestContext::CurrentChange& change, const bus::RegisterDone& done);
+  void takeSetting(const RequestContext::SettingChange& change, const bus::RegisterDone& done);
   void endStall(const axis::AxisModel& axis, motor::TmcChip& chip);
   void failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault);
   bool answers(const motor::TmcChip& chip) const;

@@ -844,8 +844,8 @@ void Machine::clearPositionCompare(const std::string& output) {
   ask(*impl_->shell_, SetPositionCompare{output, {}});
 }
 
-void Machine::setOutput(const std::string& name, bool on) {
-  ask(*impl_->shell_, SetOutput{name, on});
+void Machine::setOutput(const std::string& name, bool on, double value) {
+  ask(*impl_->shell_, SetOutput{name, on, value});
 }
 
 ProbeResult Machine::probe(const ProbeRequest& request, const std::function<bool()>& cancelled) {

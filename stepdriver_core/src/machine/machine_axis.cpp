@@ -199,6 +199,10 @@ void Axis::setCurrent(double run, double hold) {
   impl_->ask(machine::SetCurrent{impl_->id, run, hold});
 }
 
+void Axis::setStallThreshold(int threshold) {
+  impl_->ask(machine::SetStallThreshold{impl_->id, threshold});
+}
+
 void Axis::stop() { impl_->ask(machine::StopAxis{impl_->id}); }
 
 void Axis::stop(const Move& move) { impl_->ask(machine::StopMove{impl_->id, move.id}); }

@@ -8,6 +8,7 @@
 #include "gpio/chip_table.h"
 #include "message_text.h"
 #include "printable.h"
+#include "pwm_line.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
@@ -18,20 +19,25 @@ using activity::SharedCall;
 // ---- one ----
 
 NamedOutput::NamedOutput(const config::OutputConfig& config, std::size_t number, int line)
-    : config_(config), number_(number), line_(line), wanted_(config.at_fault) {
+    : config_(config), number_(number), line_(line), wanted_{config.at_fault} {
   state_.name = config.name;
-  state_.on = config.at_fault;
+  written_.setting = wanted_;
+  state_.on = wanted_.on;
+  state_.value = wanted_.value();
 }
 
-void NamedOutput::set(bool on, const SharedCall& call) {
-  if (on != wanted_) refuseCalls(fmt::format("another command switches it {}", on ? "on" : "off"));
-  wanted_ = on;
+void NamedOutput::set(const OutputSetting& setting, const SharedCall& call) {
+  if (setting != wanted_) {
+    refuseCalls(fmt::format("another command switches it {}",
+                            switchText(setting.on, setting.on ? setting.value() : 1.0)));
+  }
+  wanted_ = setting;
   state_.note.clear();
   if (call) calls_.push_back(call);
 }
 
 void NamedOutput::begin(const SharedCall& call) {
-  wanted_ = config_.initial;
+  wanted_ = {config_.initial};
   write_calls_.push_back(call);
 }
 
@@ -51,7 +57,7 @@ void NamedOutput::await(const SharedCall& call) {
 
 std::string NamedOutput::poll(activity::Context& context, const std::string& why_safe) {
   const bool must_be_safe = !why_safe.empty();
-  const bool was_safe = wanted_ == config_.at_fault;
+  const bool was_safe = wanted_.on == config_.at_fault;
   std::string failure = adopt(context);
   if (const std::string own = endWrite(context); failure.empty()) failure = own;
   activity::MotionOutputs& paths = context.motion_outputs;
@@ -65,19 +71,19 @@ std::string NamedOutput::poll(activity::Context& context, const std::string& why
       state_.note =
           fmt::format("was switched {} for safety: {}", config_.at_fault ? "on" : "off", why_safe);
     }
-    wanted_ = config_.at_fault;
+    wanted_ = {config_.at_fault};
   } else if (is_taken_) {
     paths.note(number_, lineForMotions(why_safe));
     return failure;
   } else if (const std::optional<bool> left = paths.takeWanted(number_)) {
-    set(*left, {});
+    set({*left}, {});
   } else if (mustGoOff(context.now)) {
-    wanted_ = false;
+    wanted_ = {};
     state_.note = tooLongText();
   }
   may_wait_ = !must_be_safe;
   if (job_ || (!certain_ && gave_up_)) return failure;
-  if (certain_ && state_.on == wanted_) {
+  if (certain_ && written_.setting == wanted_) {
     calls_.clear();
     write_calls_.clear();
   } else if (must_be_safe || context.now >= mayChange()) {
@@ -95,11 +101,11 @@ std::string NamedOutput::adopt(activity::Context& context) {
   if (by_path.changes != std::exchange(changes_seen_, by_path.changes)) {
     // If it was written here at that time, nobody knows which write came last.
     if (job_) job_->doubtful = true;
-    if (by_path.changed <= wrote_until_ && by_path.changed >= wrote_from_) certain_ = false;
-    if (by_path.changed >= wrote_from_) {
-      state_.on = wanted_ = by_path.on;
-      state_.changed = by_path.changed;
-      on_since_ = by_path.on_since;
+    const pulse::Nanoseconds changed = by_path.written.changed;
+    if (changed <= wrote_until_ && changed >= wrote_from_) certain_ = false;
+    if (changed >= wrote_from_) {
+      noteWritten(by_path.written);
+      wanted_ = written_.setting;
       state_.note = by_path.too_long ? tooLongText() : "";
     }
   }
@@ -113,19 +119,17 @@ activity::MotionOutputs::Line NamedOutput::lineForMotions(const std::string& why
     line.why_not = why_safe;
   } else if (!state_.error.empty()) {
     line.why_not = state_.error;
-  } else if (job_ || state_.on != wanted_) {
+  } else if (job_ || written_.setting != wanted_) {
     line.why_not = "it is being switched";
   }
-  line.on = state_.on;
-  line.changed = state_.changed.value_or(0);
-  line.on_since = on_since_;
+  line.written = written_;
   return line;
 }
 
 pulse::Nanoseconds NamedOutput::due() const {
   if (job_ || is_taken_ || !may_wait_ || (!certain_ && gave_up_)) return pulse::kNever;
-  if (!certain_ || state_.on != wanted_) return mayChange();
-  return state_.on && config_.max_on_ns ? on_since_ + *config_.max_on_ns : pulse::kNever;
+  if (!certain_ || written_.setting != wanted_) return mayChange();
+  return state_.on && config_.max_on_ns ? written_.on_since + *config_.max_on_ns : pulse::kNever;
 }
 
 std::string NamedOutput::tooLongText() const {
@@ -134,18 +138,18 @@ std::string NamedOutput::tooLongText() const {
 }
 
 bool NamedOutput::mustGoOff(pulse::Nanoseconds now) const {
-  return certain_ && state_.on && wanted_ && config_.max_on_ns &&
-         now >= on_since_ + *config_.max_on_ns;
+  return certain_ && state_.on && wanted_.on && config_.max_on_ns &&
+         now >= written_.on_since + *config_.max_on_ns;
 }
 
 pulse::Nanoseconds NamedOutput::mayChange() const {
-  if (!certain_ || !state_.changed) return 0;
-  return *state_.changed + (state_.on ? config_.min_on_ns : config_.min_off_ns);
+  if (!certain_ || !state_.changed || written_.setting.on == wanted_.on) return 0;
+  return written_.switched + (state_.on ? config_.min_on_ns : config_.min_off_ns);
 }
 
 void NamedOutput::write(activity::Context& context, bool safe) {
   job_ = Job{context.newJob(), wanted_, safe, context.now};
-  context.out->pin_jobs.push_back({job_->id, line_, config_.level(wanted_)});
+  context.out->pin_jobs.push_back({job_->id, line_, config_.level(wanted_.on), wanted_.part});
 }
 
 std::string NamedOutput::endWrite(activity::Context& context) {
@@ -163,11 +167,23 @@ std::string NamedOutput::endWrite(activity::Context& context) {
   certain_ = !job.doubtful;
   gave_up_ = false;
   state_.error.clear();
-  if (job.on == state_.on) return {};
-  state_.on = job.on;
-  on_since_ = job.began;
-  state_.changed = context.now;
+  if (job.setting == written_.setting) return {};
+  pulse::WrittenOutput written = written_;
+  written.changed = context.now;
+  if (job.setting.on != written.setting.on) {
+    written.switched = context.now;
+    if (job.setting.on) written.on_since = job.began;
+  }
+  written.setting = job.setting;
+  noteWritten(written);
   return {};
+}
+
+void NamedOutput::noteWritten(const pulse::WrittenOutput& written) {
+  written_ = written;
+  state_.on = written.setting.on;
+  state_.value = written.setting.value();
+  state_.changed = written.changed;
 }
 
 std::string NamedOutput::failed(int error, activity::Context& context) {
@@ -201,11 +217,13 @@ void NamedOutputs::begin(const SharedCall& call) {
 }
 
 void NamedOutputs::set(const activity::Context& context, const std::string& name, bool on,
-                       const SharedCall& call) {
+                       double value, const SharedCall& call) {
   const std::size_t number = numberOf(name);
+  const std::string why = whyNoValue(on, value, pwmLineOf(config(number).line).has_value());
+  if (!why.empty()) throw Refused(fmt::format("the output {}: {}", name, why));
   const bool is_free = !context.motion_outputs.isTaken(number) &&
                        context.motion_outputs.comparedAxis(number).empty();
-  if (is_free) return outputs_[number].set(on, call);
+  if (is_free) return outputs_[number].set(OutputSetting::of(on, value), call);
   throw Refused(
       fmt::format("the output {}: {} switches it", name, context.motion_outputs.holder(number)));
 }
@@ -225,7 +243,7 @@ std::size_t NamedOutputs::numberOf(const std::string& name) const {
 void NamedOutputs::stop(const activity::Context& context) {
   for (std::size_t i = 0; i < outputs_.size(); ++i) {
     const std::optional<bool>& at_stop = outputs_[i].config().at_stop;
-    if (at_stop && !context.motion_outputs.isTaken(i)) outputs_[i].set(*at_stop, {});
+    if (at_stop && !context.motion_outputs.isTaken(i)) outputs_[i].set({*at_stop}, {});
   }
 }
 

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "activity/context.h"
+#include "channel/output_line.h"
+#include "output_setting.h"
 #include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/machine/io_states.h"
 
@@ -26,7 +28,7 @@ class NamedOutput {
   /// Switches it, as soon as its least times allow.
   ///
   /// @param call is answered when that is done, or with the reason if something else comes first.
-  void set(bool on, const activity::SharedCall& call);
+  void set(const OutputSetting& setting, const activity::SharedCall& call);
   /// Switches it as it begins. @param call is answered when that is done, and doesn't fail if its
   ///   safe state comes first.
   void begin(const activity::SharedCall& call);
@@ -47,7 +49,7 @@ class NamedOutput {
  private:
   struct Job {
     std::uint64_t id = 0;
-    bool on = false;
+    OutputSetting setting;
     bool safe = false;
     pulse::Nanoseconds began = 0;
     bool doubtful = false;  // a path has switched it meanwhile: nobody knows which was the last
@@ -60,17 +62,18 @@ class NamedOutput {
   activity::MotionOutputs::Line lineForMotions(const std::string& why_safe) const;
   void write(activity::Context& context, bool safe);
   void refuseCalls(const std::string& why);
+  void noteWritten(const pulse::WrittenOutput& written);
   bool mustGoOff(pulse::Nanoseconds now) const;
   pulse::Nanoseconds mayChange() const;
 
   config::OutputConfig config_;
   std::size_t number_;
   int line_;
-  bool wanted_;
+  OutputSetting wanted_;
+  pulse::WrittenOutput written_;
   OutputState state_;
   bool certain_ = true;                  // whether the line has the level of that state for certain
   bool gave_up_ = false;                 // whether it gave up writing the safe state, until retry()
-  pulse::Nanoseconds on_since_ = 0;      // when the write that switched it on began
   bool may_wait_ = false;                // whether it may wait for its least times
   bool is_taken_ = false;                // whether a path switches it
   std::uint64_t changes_seen_ = 0;       // by paths
@@ -95,8 +98,9 @@ class NamedOutputs {
   const config::OutputConfig& config(std::size_t number) const { return outputs_[number].config(); }
   /// Switches each as it begins. @param call is answered when that is done.
   void begin(const activity::SharedCall& call);
-  /// @throw Refused if there is no such output, naming those that there are, or if a path has it.
-  void set(const activity::Context& context, const std::string& name, bool on,
+  /// @throw Refused if there is no such output, naming those that there are, if a path has it, or
+  ///   if it can't have the value.
+  void set(const activity::Context& context, const std::string& name, bool on, double value,
            const activity::SharedCall& call);
   /// The machine is stopped. Outputs that paths have are stopped with these.
   void stop(const activity::Context& context);

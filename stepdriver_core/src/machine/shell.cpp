@@ -420,7 +420,9 @@ void Shell::turnEnded(const MachineSnapshot& before,
   if (on_io_ && now->io != before.io) on_io_(*now->io);
 }
 
-void Shell::write(const activity::PinJob& job) { writers_.write(job.id, {job.output, job.level}); }
+void Shell::write(const activity::PinJob& job) {
+  writers_.write(job.id, {job.output, job.level, job.part});
+}
 
 void Shell::access(const bus::RegisterJob& job) { ports_.begin(job); }
 

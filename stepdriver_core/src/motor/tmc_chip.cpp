@@ -155,6 +155,18 @@ bus::RegisterJob TmcChip::setCurrent(const tmc::CurrentScale& scale) {
   return jobOf({write(tmc::kIholdIrun, tmc::currentsOf(effective(scale)))});
 }
 
+bus::RegisterJob TmcChip::setStallThreshold(int threshold) {
+  settings_.stall_threshold = threshold;
+  return jobOf({tmc::isOnSpi(settings_.model)
+                    ? write(tmc::kCoolconfOnSpi, tmc::coolconfOf(threshold))
+                    : write(tmc::kSgthrs, static_cast<std::uint32_t>(threshold))});
+}
+
+std::optional<tmc::Thresholds> TmcChip::stallThresholds() const {
+  if (!tmc::isOnSpi(settings_.model) && !config().stall_fault) return {};
+  return tmc::stallThresholdsOf(settings_.model);
+}
+
 bus::RegisterJob TmcChip::setIdle(bool idle) {
   is_idle_ = idle;
   return setCurrent(settings_.current);
@@ -372,7 +384,7 @@ std::string TmcChip::takeIdle(const bus::RegisterDone& done) {
   return done.failure == bus::Failure::kNone ? "" : failureText(done);
 }
 
-std::string TmcChip::takeCurrent(const bus::RegisterDone& done) {
+std::string TmcChip::takeSetting(const bus::RegisterDone& done) {
   count(done);
   if (done.failure != bus::Failure::kNone) return failureText(done);
   noteCurrents();

@@ -43,6 +43,11 @@ class TmcChip {
   double lowestCurrent() const { return currentOf(0); }
   /// Other currents, which all later jobs keep, too.
   bus::RegisterJob setCurrent(const driver::tmc::CurrentScale& scale);
+  /// Another threshold of stalls in any motion, which all later jobs keep, too.
+  bus::RegisterJob setStallThreshold(int threshold);
+  /// Those that can be set. Empty: none has a use, as SG_RESULT doesn't depend on it, and a stall
+  /// is no fault.
+  std::optional<driver::tmc::Thresholds> stallThresholds() const;
   /// At rest the current of the idle timeout, or again as before. @pre config().idle_current
   bus::RegisterJob setIdle(bool idle);
   /// setIdle(true) was the last one.
@@ -90,8 +95,9 @@ class TmcChip {
   std::string stallFault();
   /// Takes the answer to setIdle(). @return why it failed; empty if it didn't.
   std::string takeIdle(const bus::RegisterDone& done);
-  /// Takes the answer to setCurrent(). @return why the currents aren't changed; empty if they are.
-  std::string takeCurrent(const bus::RegisterDone& done);
+  /// Takes the answer to setCurrent() or setStallThreshold(). @return why the chip doesn't have it;
+  /// empty if it does.
+  std::string takeSetting(const bus::RegisterDone& done);
 
   /// [1/256 full step] Its place in the electrical cycle when it was set up, or audited last.
   int mscnt() const { return mscnt_; }

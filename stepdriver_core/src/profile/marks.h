@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "output_setting.h"
 #include "profile.h"
 
 namespace stepdriver::motion {
@@ -12,7 +13,7 @@ namespace stepdriver::motion {
 /// A place along a path at which an output is switched.
 struct Mark {
   std::int64_t place_ns = 0;  ///< position on the path, in nanoseconds of its time
-  bool on = false;
+  OutputSetting setting{};
 };
 
 /// The places at which a path switches an output. The marks of a path are numbered from 0; those
@@ -26,7 +27,7 @@ struct OutputMarks {
   std::vector<Mark> marks;  ///< by place
 
   std::uint64_t end() const { return first + marks.size(); }
-  std::int64_t lead(const Mark& mark) const { return mark.on ? lead_on_ns : lead_off_ns; }
+  std::int64_t lead(const Mark& mark) const { return mark.setting.on ? lead_on_ns : lead_off_ns; }
 };
 
 /// One for each output that a path switches.

@@ -6,6 +6,7 @@
 
 #include "channel/channel_config.h"
 #include "channel/channel_state.h"
+#include "channel/output_line.h"
 #include "profile/marks.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
@@ -71,9 +72,7 @@ struct FollowMarks {
   /// @name The state of the output, if it begins
   /// @{
   std::uint64_t changes = 0;  ///< OutputLineState::changes, as far as it is known
-  bool on = false;
-  Nanoseconds changed = 0;   ///< clock time of its last change
-  Nanoseconds on_since = 0;  ///< clock time
+  WrittenOutput written;
   /// @}
 };
 
@@ -87,9 +86,7 @@ struct Compare {
   /// @name The state of the output
   /// @{
   std::uint64_t changes = 0;  ///< OutputLineState::changes, as far as it is known
-  bool on = false;
-  Nanoseconds changed = 0;   ///< clock time of its last change
-  Nanoseconds on_since = 0;  ///< clock time
+  WrittenOutput written;
   /// @}
 };
 

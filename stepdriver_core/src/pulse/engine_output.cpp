@@ -18,19 +18,14 @@ void EngineOutput::follow(const FollowMarks& order) {
   if (!marks_.follows()) {
     if (!order.begins || state_.ended == order.group) return;
     state_.group = order.group;
-    adopt(order.changes, order.on, order.changed, order.on_since);
+    adopt(order.changes, order.written);
   }
   marks_.follow({order.along, order.marks, order.delay, order.serial});
 }
 
 // The state of the output when an order begins, unless that doesn't know the last change yet.
-void EngineOutput::adopt(std::uint64_t changes, bool on, Nanoseconds changed,
-                         Nanoseconds on_since) {
-  if (changes == state_.changes) {
-    state_.on = on;
-    state_.changed = changed;
-    state_.on_since = on_since;
-  }
+void EngineOutput::adopt(std::uint64_t changes, const WrittenOutput& written) {
+  if (changes == state_.changes) state_.written = written;
   state_.too_long = false;
   state_.error = 0;
 }
@@ -54,11 +49,13 @@ void EngineOutput::taken(std::uint64_t serial) {
 Nanoseconds EngineOutput::markDue(Nanoseconds slipped) const {
   if (!marks_.due()) return kNever;
   const Nanoseconds due = *marks_.due() + slipped;
-  return marks_.on() == state_.on ? due : std::max(due, mayChange());
+  return marks_.setting().on == state_.written.setting.on ? due : std::max(due, mayChange());
 }
 
 Nanoseconds EngineOutput::tooLongAt() const {
-  return state_.on && line_.max_on != kNever ? state_.on_since + line_.max_on : kNever;
+  return state_.written.setting.on && line_.max_on != kNever
+             ? state_.written.on_since + line_.max_on
+             : kNever;
 }
 
 Nanoseconds EngineOutput::due(Nanoseconds slipped) const {
@@ -86,10 +83,10 @@ bool EngineOutput::serveMark(Nanoseconds now, Nanoseconds slipped, PinRing* ring
   if (!marks_.follows()) return false;
   if (markDue(slipped) <= now) {
     state_.too_long = false;
-    if (write(marks_.on(), now, ring)) marks_.advance();
+    if (write(marks_.setting(), now, ring)) marks_.advance();
   } else if (tooLongAt() <= now) {
     state_.too_long = true;
-    write(false, now, ring);
+    write({}, now, ring);
   } else {
     return false;
   }
@@ -100,7 +97,7 @@ bool EngineOutput::serveMark(Nanoseconds now, Nanoseconds slipped, PinRing* ring
 
 void EngineOutput::compare(const Compare& order, double joint) {
   endCompare();
-  adopt(order.changes, order.on, order.changed, order.on_since);
+  adopt(order.changes, order.written);
   channel_ = order.channel;
   state_.compare = order.serial;
   compare_.begin(*order.track, joint);
@@ -134,13 +131,14 @@ void EngineOutput::axisEnded(Nanoseconds motion_now, double joint, bool reached)
 
 Nanoseconds EngineOutput::compareDue(Nanoseconds slipped) const {
   Nanoseconds due = pulse_ends_;
-  if (rests_) due = std::min(due, *rests_ == state_.on ? 0 : mayChange());
+  if (rests_) due = std::min(due, *rests_ == state_.written.setting.on ? 0 : mayChange());
   if (reached_) due = 0;
   if (!compare_.due()) return due;
   const Nanoseconds next = *compare_.due() + slipped;
   const CompareAction action = compare_.action();
-  const bool changes = isWritten() && ((action == CompareAction::kOn && !state_.on) ||
-                                       (action == CompareAction::kOff && state_.on));
+  const bool changes =
+      isWritten() && ((action == CompareAction::kOn && !state_.written.setting.on) ||
+                      (action == CompareAction::kOff && state_.written.setting.on));
   return std::min(due, changes ? std::max(next, mayChange()) : next);
 }
 
@@ -159,12 +157,12 @@ bool EngineOutput::serveCompare(Nanoseconds now, Nanoseconds slipped, PinRing* r
   if (state_.muted) rests_.reset();
   if (pulse_ends_ <= now) {
     pulse_ends_ = kNever;
-    write(false, now, ring);
+    write({}, now, ring);
   } else if (tooLongAt() <= now && isWritten()) {
     state_.too_long = true;
-    write(false, now, ring);
-  } else if (rests_ && (*rests_ == state_.on || mayChange() <= now)) {
-    write(*std::exchange(rests_, std::nullopt), now, ring);
+    write({}, now, ring);
+  } else if (rests_ && (*rests_ == state_.written.setting.on || mayChange() <= now)) {
+    write({*std::exchange(rests_, std::nullopt)}, now, ring);
   } else if (compareDue(slipped) <= now) {
     if (std::exchange(reached_, false)) {
       act(CompareAction::kPulse, now, ring);
@@ -182,37 +180,42 @@ bool EngineOutput::serveCompare(Nanoseconds now, Nanoseconds slipped, PinRing* r
 
 void EngineOutput::act(CompareAction action, Nanoseconds now, PinRing* ring) {
   if (action == CompareAction::kNothing) return;
-  const bool may = action == CompareAction::kPulse ? !state_.on && mayChange() <= now : true;
+  const bool may =
+      action == CompareAction::kPulse ? !state_.written.setting.on && mayChange() <= now : true;
   if (!isWritten() || !may) {
     ++state_.missed;
     return;
   }
   state_.too_long = false;
-  if (!write(action != CompareAction::kOff, now, ring)) {
+  if (!write({action != CompareAction::kOff}, now, ring)) {
     ++state_.missed;
     return;
   }
   ++state_.compared;
-  if (action == CompareAction::kPulse) pulse_ends_ = state_.changed + compare_.track()->pulse;
+  if (action == CompareAction::kPulse)
+    pulse_ends_ = state_.written.changed + compare_.track()->pulse;
 }
 
 // ---- all ----
 
 // @return whether it has that state; otherwise the path's part has ended.
-bool EngineOutput::write(bool on, Nanoseconds now, PinRing* ring) {
-  if (on == state_.on) return true;
-  const gpio::LineWrite write{line_.output, on == line_.active};
+bool EngineOutput::write(const OutputSetting& setting, Nanoseconds now, PinRing* ring) {
+  if (setting == state_.written.setting) return true;
+  const gpio::LineWrite write{line_.output, setting.on == line_.active, setting.part};
   if (const int error = lines_.write(&write, 1)) {
     state_.error = error;
     end();
     mute();
     return false;
   }
-  state_.on = on;
-  state_.changed = clock_.now();
-  if (on) state_.on_since = now;
+  WrittenOutput& last = state_.written;
+  const bool is_switched = setting.on != last.setting.on;
+  last.setting = setting;
+  last.changed = clock_.now();
+  if (is_switched) last.switched = last.changed;
+  if (is_switched && setting.on) last.on_since = now;
   ++state_.changes;
-  if (ring != nullptr) ring->addChange(write.output, write.level, state_.changed);
+  if (is_switched && ring != nullptr) ring->addChange(write.output, write.level, last.changed);
   return true;
 }
 

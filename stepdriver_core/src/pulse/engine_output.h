@@ -60,12 +60,13 @@ class EngineOutput {
   bool serveMark(Nanoseconds now, Nanoseconds slipped, PinRing* ring);
   bool serveCompare(Nanoseconds now, Nanoseconds slipped, PinRing* ring);
   void act(CompareAction action, Nanoseconds now, PinRing* ring);
-  void adopt(std::uint64_t changes, bool on, Nanoseconds changed, Nanoseconds on_since);
+  void adopt(std::uint64_t changes, const WrittenOutput& written);
   Nanoseconds mayChange() const {
-    return state_.changed + (state_.on ? line_.min_on : line_.min_off);
+    const WrittenOutput& last = state_.written;
+    return last.switched + (last.setting.on ? line_.min_on : line_.min_off);
   }
   bool isWritten() const { return channel_ >= 0 && !state_.muted; }
-  bool write(bool on, Nanoseconds now, PinRing* ring);
+  bool write(const OutputSetting& setting, Nanoseconds now, PinRing* ring);
   void publish();
 
   const OutputLine line_;

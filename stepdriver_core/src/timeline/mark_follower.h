@@ -42,7 +42,7 @@ class MarkFollower {
   /// When the next mark comes; empty: the motion doesn't reach another one.
   const std::optional<Nanoseconds>& due() const { return due_; }
   /// What the next mark does. @pre it is due at some time
-  bool on() const { return nextMark().on; }
+  const OutputSetting& setting() const { return nextMark().setting; }
   /// The next mark has been made.
   void advance();
   /// The number of the next mark: so many were made since the begin of the path.

@@ -10,6 +10,7 @@
 #include "nanoseconds.h"
 #include "path_reader.h"
 #include "printable.h"
+#include "pwm_line.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::motion {
@@ -72,7 +73,8 @@ std::vector<PathOutput> pathOutputs(const std::vector<config::OutputConfig>& out
   std::vector<PathOutput> known;
   known.reserve(outputs.size());
   for (const config::OutputConfig& output : outputs) {
-    known.push_back({output.name, output.min_on_ns, output.min_off_ns, output.max_on_ns});
+    known.push_back({output.name, pwmLineOf(output.line).has_value(), output.min_on_ns,
+                     output.min_off_ns, output.max_on_ns});
   }
   for (const OutputLead& lead : leads) {
     const auto found = std::find_if(known.begin(), known.end(), [&](const PathOutput& output) {
@@ -130,21 +132,22 @@ void requireRates(const std::vector<PathMark>& marks, const std::vector<PathOutp
   std::vector<Last> last(outputs.size());
   for (const PathMark& mark : marks) {
     const PathOutput& output = outputs[mark.output];
-    const std::int64_t lead = mark.on ? output.lead_on_ns : output.lead_off_ns;
+    const std::int64_t lead = mark.setting.on ? output.lead_on_ns : output.lead_off_ns;
     const std::int64_t time_ns = std::max<std::int64_t>(0, mark.place_ns - lead);
     Last& before = last[mark.output];
-    if (before.mark != nullptr && before.mark->on == mark.on) continue;
+    if (before.mark != nullptr && before.mark->setting.on == mark.setting.on) continue;
     if (before.mark != nullptr) {
       const std::int64_t since = time_ns - before.time_ns;
       const std::int64_t least =
-          std::max<std::int64_t>(1, mark.on ? output.min_off_ns : output.min_on_ns);
+          std::max<std::int64_t>(1, mark.setting.on ? output.min_off_ns : output.min_on_ns);
       if (since < least) {
         throw Refused(fmt::format(
             "{} switches the output {} {} {} after it was switched {}, but {} of it is {}",
-            textOf(mark), output.name, mark.on ? "on" : "off", secondsText(since),
-            mark.on ? "off" : "on", mark.on ? "min_off_ms" : "min_on_ms", secondsText(least)));
+            textOf(mark), output.name, mark.setting.on ? "on" : "off", secondsText(since),
+            mark.setting.on ? "off" : "on", mark.setting.on ? "min_off_ms" : "min_on_ms",
+            secondsText(least)));
       }
-      if (!mark.on && output.max_on_ns && since > *output.max_on_ns) {
+      if (!mark.setting.on && output.max_on_ns && since > *output.max_on_ns) {
         throw Refused(fmt::format(
             "{} switches the output {} off {} after it was switched on, but max_on_s of it is {}",
             textOf(mark), output.name, secondsText(since), secondsText(*output.max_on_ns)));
@@ -165,7 +168,7 @@ std::shared_ptr<const PathMarks> marksByOutput(const std::vector<PathMark>& mark
     own.lead_off_ns = outputs[i].lead_off_ns;
     own.first = i < passed.size() ? passed[i] : 0;
     for (const PathMark& mark : marks) {
-      if (mark.output == i) own.marks.push_back({mark.place_ns, mark.on});
+      if (mark.output == i) own.marks.push_back({mark.place_ns, mark.setting});
     }
     if (own.end() > 0) all->push_back(std::move(own));
   }

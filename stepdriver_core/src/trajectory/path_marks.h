@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/path.h"
+#include "output_setting.h"
 #include "path_timing/acceleration_limited.h"
 #include "profile/marks.h"
 #include "stepdriver_core/config/io_config.h"
@@ -18,6 +19,7 @@ namespace stepdriver::motion {
 /// What a path must know of an output that it may switch.
 struct PathOutput {
   std::string name;
+  bool is_pwm = false;
   std::int64_t min_on_ns = 0;
   std::int64_t min_off_ns = 0;
   std::optional<std::int64_t> max_on_ns;
@@ -38,7 +40,7 @@ std::string outputsText(const std::vector<PathOutput>& outputs);
 struct PathMark {
   std::size_t segment = 0;  ///< begins there; the number of segments: the end of the path
   std::size_t output = 0;   ///< by its number
-  bool on = false;
+  OutputSetting setting{};
   std::size_t number = 0;     ///< of the segment that asks for it, in a refusal
   bool appended_to = false;   ///< that segment is one of a path to which others are appended
   std::int64_t place_ns = 0;  ///< see Mark

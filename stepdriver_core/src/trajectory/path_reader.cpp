@@ -83,9 +83,15 @@ void PathReader::readOutputs(const PathSegment& given, std::size_t segment) {
     PathMark& mark = marks_.emplace_back();
     mark.segment = segment;
     mark.output = number;
-    mark.on = wanted.on;
+    mark.setting = settingOf(wanted, found->is_pwm);
     mark.number = index_;
   }
+}
+
+OutputSetting PathReader::settingOf(const OutputSwitch& wanted, bool is_pwm) const {
+  const std::string why = whyNoValue(wanted.on, wanted.value, is_pwm);
+  if (!why.empty()) refuse(fmt::format("switches the output {}: {}", wanted.output, why));
+  return OutputSetting::of(wanted.on, wanted.value);
 }
 
 void PathReader::refuse(const std::string& why) const {

@@ -54,6 +54,7 @@ class PathReader {
   bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
                const std::array<double, 2>& to) const;
   void readOutputs(const PathSegment& given, std::size_t segment);
+  OutputSetting settingOf(const OutputSwitch& wanted, bool is_pwm) const;
   bool leadsNowhere(const PathSegment& given, const CurveSegment& segment) const;
   void requireRate(double velocity, double finest, const char* unit) const;
   void readSpeed(const PathSegment& given, CurveSegment& segment) const;

@@ -1,6 +1,6 @@
 """The threshold at which a driver chip reports a stall, from the load that it has measured without one, and
 how well homings to a stall repeat. SG_RESULT falls as the load rises; at or below twice the threshold it is
-a stall."""
+a stall. On SPI the threshold (SGT) shifts SG_RESULT, and 0 is a stall."""
 
 import math
 from collections import namedtuple
@@ -12,6 +12,10 @@ AT_SPEED = 0.999  # a slower sample is one of a ramp
 SETTLING = 4  # [full steps] at a constant speed until the chip has measured the load there
 HALF = 0.5  # of the lowest SG_RESULT without a stall is one
 PER_UNIT = 2  # of SG_RESULT in one of the threshold
+# On SPI, SG_RESULT without a load is at least this if it is 0 at a stall: the two differ by so much at least
+# (TMC2130 datasheet rev. 1.09, section 14.3).
+FREE = 100
+SGT = (-64, 63)  # from the most sensitive threshold on SPI to the least
 CYCLE = 1024  # of MSCNT, in 4 full steps
 CYCLE_STEPS = 4
 
@@ -26,8 +30,23 @@ def at_speed(samples, speed, full_step):
 
 
 def threshold_of(samples):
-    """Of these samples without a stall; 0 if the load leaves no room for one."""
-    return int(min(sample.load for sample in samples) * HALF / PER_UNIT)
+    """Of these samples without a stall; None if the load leaves no room for one."""
+    return int(min(sample.load for sample in samples) * HALF / PER_UNIT) or None
+
+
+def most_sensitive(lowest_load):
+    """The threshold on SPI; None if the load leaves no room for one. lowest_load(threshold): the lowest SG_RESULT
+    without a stall, which rises with the threshold."""
+    low, high = SGT
+    if lowest_load(high) < FREE:
+        return None
+    while low < high:
+        middle = (low + high) // 2
+        if lowest_load(middle) < FREE:
+            low = middle + 1
+        else:
+            high = middle
+    return high
 
 
 def middle_of(phases):

@@ -48,6 +48,7 @@
 #include "node/topics/clock_publisher.h"
 #include "node/topics/io_publisher.h"
 #include "node/topics/jog_subscriber.h"
+#include "node/topics/output_subscriber.h"
 #include "node/topics/setpoint_subscriber.h"
 #include "node/topics/state_publisher.h"
 #include "node/topics/trajectory_command.h"
@@ -80,11 +81,11 @@ On SIGINT, SIGTERM, SIGQUIT, SIGHUP and `rosnode kill` it decelerates, disables 
 the lines and ends. On SIGUSR1 it writes what its flight recorder holds, as ~dump does.
 
   services    ~AXIS/move_to  ~AXIS/move_rounds  ~AXIS/plan  ~AXIS/microstep
-              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/set_current  ~AXIS/home
-              ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
+              ~AXIS/set_position  ~AXIS/set_limits  ~AXIS/set_current
+              ~AXIS/set_stall_threshold  ~AXIS/home  ~AXIS/enable  ~AXIS/sleep  ~AXIS/reset  ~AXIS/stop
               ~stop  ~emergency_stop  ~recover  ~speed_override  ~enable  ~home
               ~move_line  ~follow_path  ~append_path  ~plan_path  ~hold  ~resume  ~dump
-              ~set_output  ~set_position_compare  ~probe
+              ~set_output  ~set_output_value  ~set_position_compare  ~probe
               ~rig/report  ~rig/emergency_stop  ~rig/AXIS/press_min  ~rig/AXIS/press_max
               ~rig/inputs/NAME (on the simulated rig)
   topics      joint_states  ~endstops  ~axis_states  ~AXIS/state  ~AXIS/driver  ~state
@@ -261,6 +262,7 @@ int run(const Parameters& parameters, ros::NodeHandle node, ros::NodeHandle priv
   if (hardware.simulation() != nullptr) machine_services.advertiseRig(*hardware.simulation());
   recorder.advertise(private_node, queues);
   const JogSubscriber jog_subscriber(private_node, machine, queues, latched, config.jog_timeout);
+  const OutputSubscriber output_subscriber(private_node, machine, queues, latched);
   const SetpointSubscriber setpoint_subscriber(private_node, machine, queues, latched,
                                                config.setpoint_mode, config.setpoint_timeout);
   const TrajectoryCommand trajectory_command(private_node, machine, queues, latched,

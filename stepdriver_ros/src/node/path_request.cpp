@@ -56,7 +56,8 @@ motion::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
     segment.tolerance = fields.tolerance < 0.0 ? 0.0 : fields.tolerance;
   }
   for (const OutputSwitch& output : fields.outputs) {
-    segment.outputs.push_back({output.name, output.on != 0});
+    segment.outputs.push_back(
+        {output.name, output.on != 0, output.value == 0.0 ? 1.0 : output.value});
   }
   return segment;
 }

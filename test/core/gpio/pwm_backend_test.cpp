@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -164,6 +165,23 @@ TEST_F(PwmBackendTest, EachLevelIsALengthOfItsPulses) {
   }
   EXPECT_EQ(duty(), "1000000") << "its safe level before it is released";
   EXPECT_EQ(folder_.read("pwm1/enable"), "1");
+}
+
+TEST_F(PwmBackendTest, APartIsALengthBetweenThoseOfItsLevels) {
+  const auto lines = request(kServo);
+  const auto length = [&](bool level, std::uint16_t part) {
+    const LineWrite write{0, level, part};
+    EXPECT_EQ(lines->write(&write, 1), 0);
+    return std::stol(duty());
+  };
+  EXPECT_NEAR(length(true, LineWrite::kWhole / 4), 1'250'000, 16);
+  EXPECT_NEAR(length(true, 1), 1'000'015, 1);
+  EXPECT_EQ(length(false, LineWrite::kWhole / 4), 1'000'000);
+  EXPECT_EQ(length(true, LineWrite::kWhole), 2'000'000);
+  // With on shorter than off.
+  const auto turned = pwmLineOf("pwmchip0:1/20000000/2000000/1000000");
+  ASSERT_TRUE(turned);
+  EXPECT_NEAR(static_cast<double>(turned->lengthOf(LineWrite::kWhole / 4)), 1'750'000, 16);
 }
 
 TEST_F(PwmBackendTest, BeginsAndEndsWithItsSafeLevel) {

@@ -324,7 +324,8 @@ TEST_P(StallHoming, KeepsItsCurrentToTheEnd) {
     EXPECT_EQ(machine.registers(), now);
     return false;
   });
-  EXPECT_TRUE(contains(refusal, "its current is that of a homing to a stall")) << refusal;
+  EXPECT_TRUE(contains(refusal, "its current and threshold are those of a homing to a stall"))
+      << refusal;
   machine.expectRegistersAsBefore();
 }
 

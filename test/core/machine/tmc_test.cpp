@@ -34,6 +34,7 @@ constexpr int kGconf = 0x00;
 constexpr int kIholdIrun = 0x10;
 constexpr int kVactual = 0x22;
 constexpr int kChopconf = 0x6C;
+constexpr int kCoolconf = 0x6D;
 constexpr const char* kPort = "/dev/serial0";
 
 std::vector<config::AxisConfig> fourAxes() {
@@ -547,6 +548,39 @@ TEST_P(TmcOnSpi, TellsItsLoadInSpreadCycle) {
   EXPECT_GT(*driver.stall_guard, 510);
   EXPECT_NEAR(*driver::loadOf(driver), 1.0 - *driver.stall_guard / 1023.0, 1e-12);
   EXPECT_FALSE(driver.stealth_chop);
+}
+
+TEST_P(TmcOnSpi, TellsAnotherLoadWithAnotherThreshold) {
+  config::AxisConfig config = spiAxis(GetParam());
+  config.tmc->mode = config::ChopperMode::kSpreadCycle;
+  Bench bench({config});
+  const auto load = [&] {
+    bench.move(bench.axis().state().position > 0.02 ? 0.0 : 0.05);
+    return *bench.axis().state().drivers->front().stall_guard;
+  };
+  const int before = load();
+  bench.axis().setStallThreshold(-20);
+  EXPECT_NEAR(load(), before - 160, 30);
+  bench.axis().setStallThreshold(63);
+  EXPECT_EQ(load(), 1023);
+  for (const int refused : {-65, 64}) {
+    EXPECT_PRED2(has, failureOf([&] { bench.axis().setStallThreshold(refused); }),
+                 "must be from -64 to 63");
+  }
+  // It is kept when all registers are written again.
+  bench.axis().setStallThreshold(-20);
+  bench.machine->emergencyStop();
+  bench.machine->recover();
+  EXPECT_EQ(bench.rig.registerOf("x", kCoolconf) >> 16U & 0x7FU, 128U - 20U);
+}
+
+TEST(TmcDrivers, RefuseAStallThresholdThatTheyDoNotUse) {
+  Bench bench({tmcAxis()});
+  EXPECT_PRED2(has, failureOf([&] { bench.axis().setStallThreshold(50); }),
+               "uses a threshold in homings only");
+  Bench with_pins({test::linearAxis("x")});
+  EXPECT_PRED2(has, failureOf([&] { with_pins.axis().setStallThreshold(50); }),
+               "it has no driver with `tmc`");
 }
 
 TEST_P(TmcOnSpi, IsNamedIfAnotherChipIsThere) {

@@ -129,6 +129,11 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   homing.pull_off = 0.001;
   homing.offset = -0.009;
   homing.max_travel = 0.04;
+  if (variant == 1 || variant == kShaped) {
+    homing.kind = variant == 1 ? config::HomingKind::kFlag : config::HomingKind::kFlagCentre;
+    homing.input = kProbeInput;
+    homing.offset = kPressedFrom / 1e3;
+  }
   configs[0].homing = homing;
   configs[1].backlash = 0.0004;
   configs[1].align_on_microstep_change = true;
@@ -2036,7 +2041,7 @@ void Participants::checkCompared() {
   const pulse::ChannelState y = engine_->channel(static_cast<int>(kCompared));
   if (tool.compare == 0 || tool.muted || tool.too_long || y.following != 0 || pins_failed_) return;
   const config::OutputConfig config = optionsOf(schedule_.variant).outputs[0];
-  if (clock_.now() < tool.changed + config.min_on_ns) return;
+  if (clock_.now() < tool.written.switched + config.min_on_ns) return;
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes[kCompared];
   const double place = static_cast<double>(y.count - y.slack) + y.between;

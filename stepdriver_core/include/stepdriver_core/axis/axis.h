@@ -114,6 +114,17 @@ class Axis {
   ///   set up. @throw GpioError if a chip doesn't take it: the axis is then at fault.
   void setCurrent(double run, double hold);
 
+  /// Changes the threshold of stalls in any motion of its driver chips on SPI, and of others with a
+  /// StallFaultConfig, until the machine ends; a homing to a stall keeps its own. On SPI it shifts
+  /// driver::DriverState::stall_guard, which is how one that suits the motor is found. Returns when
+  /// the chip has it.
+  ///
+  /// @param threshold see config::StallConfig.
+  /// @throw Refused if it is out of range, if a motor has no such driver, while one isn't set up,
+  ///   and in a homing to a stall. @throw GpioError if a chip doesn't take it: the axis is then at
+  ///   fault.
+  void setStallThreshold(int threshold);
+
   /// Decelerates to rest, and returns when the pulse thread has the deceleration. The axes that
   /// move together with this one stop with it, along their path. A held goal is given up. Does
   /// nothing if the axis is at rest.

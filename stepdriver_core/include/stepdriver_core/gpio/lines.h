@@ -30,8 +30,12 @@ struct InputRequest {
 
 /// An output, by its index in the request, and its new level.
 struct LineWrite {
+  static constexpr std::uint16_t kWhole = 65'535;
   int output;
   bool level;
+  /// Of a PWM output that becomes high: how far the length of its pulses is from that of low to
+  /// that of high, in parts of kWhole. Other outputs don't have it.
+  std::uint16_t part = kWhole;
 };
 
 /// An edge of an input. It is only a wake-up and a time: edges may be lost, doubled or late, so use

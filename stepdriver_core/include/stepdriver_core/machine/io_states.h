@@ -13,6 +13,8 @@ namespace stepdriver::machine {
 struct OutputState {
   std::string name;
   bool on = false;  ///< as its line was written last
+  /// The same: 0 off, 1 on, and between them a PWM output that is on in part.
+  double value = 0.0;
   /// On the clock of the machine, when that write had ended; empty: it has not changed since the
   /// start.
   std::optional<pulse::Nanoseconds> changed;
@@ -49,9 +51,9 @@ struct IoStates {
 };
 
 inline bool operator==(const OutputState& one, const OutputState& other) {
-  return one.name == other.name && one.on == other.on && one.changed == other.changed &&
-         one.note == other.note && one.error == other.error && one.axis == other.axis &&
-         one.compared == other.compared && one.missed == other.missed;
+  return one.name == other.name && one.on == other.on && one.value == other.value &&
+         one.changed == other.changed && one.note == other.note && one.error == other.error &&
+         one.axis == other.axis && one.compared == other.compared && one.missed == other.missed;
 }
 inline bool operator==(const InputState& one, const InputState& other) {
   return one.name == other.name && one.active == other.active && one.changed == other.changed &&

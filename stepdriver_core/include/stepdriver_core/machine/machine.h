@@ -320,10 +320,15 @@ class Machine {
   /// While an axis is at fault, from an emergency stop until recover(), and from the beginning of a
   /// shutdown on, each output is in its safe state. It stays in it until this is called again.
   ///
-  /// @throw Refused if there is no such output, while the outputs are in their safe states, if that
-  ///   comes before it was switched, or if another call switches it otherwise meanwhile.
+  /// @param value of a PWM output that is on, above 0: 1 is the length of its pulses when it is on,
+  ///   and smaller values are nearer to that when it is off. It changes at once whatever the least
+  ///   times are.
+  /// @throw Refused if there is no such output, if it can't have the value, while the outputs are
+  /// in
+  ///   their safe states, if that comes before it was switched, or if another call switches it
+  ///   otherwise meanwhile.
   /// @throw GpioError if its line can't be written; then all axes have a fault.
-  void setOutput(const std::string& name, bool on);
+  void setOutput(const std::string& name, bool on, double value = 1.0);
 
   /// Lets the position of an axis switch an output, at the nanosecond at which the joint arrives at
   /// a place, until clearPositionCompare(). Nothing else switches it meanwhile, except to its safe

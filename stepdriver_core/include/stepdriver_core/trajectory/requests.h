@@ -58,6 +58,7 @@ struct TrajectoryRequest {
 struct OutputSwitch {
   std::string output;
   bool on = false;
+  double value = 1.0;  ///< of a PWM output that is on: see Machine::setOutput()
 };
 
 /// How much earlier than at their places a path switches an output: what a valve or a pump needs.

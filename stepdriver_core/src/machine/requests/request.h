@@ -35,6 +35,7 @@
 #include "set_position.h"
 #include "set_position_compare.h"
 #include "set_speed_override.h"
+#include "set_stall_threshold.h"
 #include "sleep.h"
 #include "stop_all.h"
 #include "stop_axis.h"
@@ -47,10 +48,10 @@ namespace stepdriver::machine {
 using Request =
     std::variant<MoveTo, MoveRounds, PlanMove, Jog, JogTogether, FollowSetpoints, MoveLine,
                  FollowTrajectory, ExtendPath, StopAxis, StopMove, StopAll, Hold, Resume,
-                 SetSpeedOverride, SetLimits, SetCurrent, Home, CancelHoming, Enable, Sleep, Reset,
-                 SetMicrosteps, SetPosition, Recover, SetOutput, SetPositionCompare, BeginLatch,
-                 EndLatch, ProbeStroke, BringUp, RestorePosition, NotePosition, Close, AwaitRest,
-                 PowerDown>;
+                 SetSpeedOverride, SetLimits, SetCurrent, SetStallThreshold, Home, CancelHoming,
+                 Enable, Sleep, Reset, SetMicrosteps, SetPosition, Recover, SetOutput,
+                 SetPositionCompare, BeginLatch, EndLatch, ProbeStroke, BringUp, RestorePosition,
+                 NotePosition, Close, AwaitRest, PowerDown>;
 
 /// Whether it may be refused because of the level of a switch: the inputs are read when it is made.
 inline bool readsInputs(const Request& request) {

@@ -59,13 +59,13 @@ class RequestContext {
   PositionLatches latches;
   std::vector<SharedCall> awaiting_rest;  ///< answered when every axis is at rest
 
-  /// Currents that are being written to a driver chip.
-  struct CurrentChange {
+  /// A current or a threshold that is being written to a driver chip.
+  struct SettingChange {
     AxisId axis = 0;
     std::size_t motor = 0;
     SharedCall call;
   };
-  std::map<std::uint64_t, CurrentChange> current_changes;  ///< by their jobs
+  std::map<std::uint64_t, SettingChange> setting_changes;  ///< by their jobs
 
   axis::AxisModel& axis(AxisId id) const { return *context.axes.at(id); }
   /// The axis, and all that share its motors.

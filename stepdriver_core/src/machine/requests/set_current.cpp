@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
+#include "chip_settings.h"
 #include "driver/tmc_registers.h"
 #include "message_text.h"
 
@@ -56,28 +56,17 @@ void SetCurrent::serve(RequestContext& machine, const SharedCall& call) const {
   axis::AxisModel& changed = machine.axis(axis);
   changed.refuseUnlessOpen();
   std::vector<Change> changes;
-  for (std::size_t i = 0; i < changed.motor.chips(); ++i) {
-    motor::TmcChip* chip = changed.motor.tmcAt(i);
-    if (chip == nullptr) continue;
-    const Wanted wanted = checkedCurrents(changed, *chip, *this);
-    if (!chip->isSetUp()) {
-      changed.refuse(changed.chipText(i) +
-                     " isn't set up: it has no power, or the axis is at fault");
-    }
-    if (chip->isPreparedForStall()) {
-      changed.refuse("its current is that of a homing to a stall, until that ends");
-    }
-    changes.push_back({i, chip->scaleOf(wanted.run, wanted.hold)});
+  for (const std::size_t motor : settableChips(changed)) {
+    const motor::TmcChip& chip = *changed.motor.tmcAt(motor);
+    const Wanted wanted = checkedCurrents(changed, chip, *this);
+    changes.push_back({motor, chip.scaleOf(wanted.run, wanted.hold)});
   }
   if (changes.empty()) {
     changed.refuse("its current is set by the board: it has no driver with `tmc`");
   }
   for (const Change& change : changes) {
-    bus::RegisterJob job = changed.motor.tmcAt(change.motor)->setCurrent(change.scale);
-    job.id = machine.context.newJob();
-    machine.context.out->register_jobs.push_back(job);
-    machine.current_changes.emplace(job.id,
-                                    RequestContext::CurrentChange{axis, change.motor, call});
+    writeSetting(machine, axis, change.motor,
+                 changed.motor.tmcAt(change.motor)->setCurrent(change.scale), call);
   }
 }
 

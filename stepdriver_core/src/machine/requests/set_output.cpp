@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "output_setting.h"
 #include "printable.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::machine {
 
 std::string SetOutput::text(const AxisWords& /*axes*/) const {
-  return fmt::format("switch {} {}", printable(name), on ? "on" : "off");
+  return fmt::format("switch {} {}", printable(name), switchText(on, value));
 }
 
 void SetOutput::serve(RequestContext& machine, const SharedCall& call) const {
@@ -18,7 +19,7 @@ void SetOutput::serve(RequestContext& machine, const SharedCall& call) const {
                               machine.context.mode.closed.empty() ? "; call recover first" : ""));
   }
   machine.refuseWhileEmergencyStopInput();
-  machine.named.outputs.set(machine.context, name, on, call);
+  machine.named.outputs.set(machine.context, name, on, value, call);
 }
 
 }  // namespace stepdriver::machine

@@ -18,7 +18,7 @@ CallQueues::CallQueues(std::size_t axes, std::size_t outputs)
     : lines_(waiting_pool_, static_cast<int>(axes) + kSpareLineThreads),
       trajectories_(waiting_pool_, kTrajectoryThreads),
       streams_(waiting_pool_, static_cast<int>(axes) + 1),
-      outputs_(waiting_pool_, static_cast<int>(2 * outputs) + 1),
+      outputs_(waiting_pool_, static_cast<int>(3 * outputs) + 1),
       recordings_(waiting_pool_, 1),
       control_(control_pool_, kControlThreads),
       stops_("stops"),

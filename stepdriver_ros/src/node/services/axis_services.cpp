@@ -59,6 +59,7 @@ AxisServices::AxisServices(const ros::NodeHandle& node, std::size_t index, axis:
   advertise<Microstep>("microstep", &AxisServices::microstep, own);
   advertise<SetLimits>("set_limits", &AxisServices::setLimits, own);
   advertise<SetCurrent>("set_current", &AxisServices::setCurrent, own);
+  advertise<SetStallThreshold>("set_stall_threshold", &AxisServices::setStallThreshold, own);
   advertise<SetPosition>("set_position", &AxisServices::setPosition, own);
   advertise<std_srvs::SetBool>("enable", &AxisServices::enable, queues.power(index));
   advertise<std_srvs::SetBool>("sleep", &AxisServices::sleep, own);
@@ -199,6 +200,14 @@ bool AxisServices::setCurrent(SetCurrent::Request& request, SetCurrent::Response
     response.hold_current = drivers->front().hold_current;
   }
   return true;
+}
+
+bool AxisServices::setStallThreshold(SetStallThreshold::Request& request,
+                                     SetStallThreshold::Response& response) {
+  return respond(response, [&] {
+    axis_.setStallThreshold(request.threshold);
+    response.message = axis_.config().name + ": a stall at " + std::to_string(request.threshold);
+  });
 }
 
 bool AxisServices::setPosition(SetPosition::Request& request, SetPosition::Response& response) {

@@ -11,6 +11,7 @@
 #include <stepdriver/SetCurrent.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetPosition.h>
+#include <stepdriver/SetStallThreshold.h>
 
 #include <string>
 #include <vector>
@@ -45,6 +46,8 @@ class AxisServices {
   bool microstep(Microstep::Request& request, Microstep::Response& response);
   bool setLimits(SetLimits::Request& request, SetLimits::Response& response);
   bool setCurrent(SetCurrent::Request& request, SetCurrent::Response& response);
+  bool setStallThreshold(SetStallThreshold::Request& request,
+                         SetStallThreshold::Response& response);
   bool setPosition(SetPosition::Request& request, SetPosition::Response& response);
   bool enable(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool sleep(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);

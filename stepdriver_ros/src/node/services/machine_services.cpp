@@ -11,6 +11,7 @@
 #include <stepdriver/Probe.h>
 #include <stepdriver/RigReport.h>
 #include <stepdriver/SetOutput.h>
+#include <stepdriver/SetOutputValue.h>
 #include <stepdriver/SetPositionCompare.h>
 #include <stepdriver/SpeedOverride.h>
 
@@ -237,6 +238,14 @@ void MachineServices::advertiseSetOutput(machine::Machine& machine) {
       };
   node_.setCallbackQueue(&queues_.outputs());
   servers_.push_back(node_.advertiseService("set_output", handler));
+  const boost::function<bool(SetOutputValue::Request&, SetOutputValue::Response&)> value_handler =
+      [&machine](SetOutputValue::Request& request, SetOutputValue::Response& response) {
+        return respond(response, [&] {
+          switchTo(machine, request.name, request.value);
+          response.message = fmt::format("{} is at {}", request.name, roundedText(request.value));
+        });
+      };
+  servers_.push_back(node_.advertiseService("set_output_value", value_handler));
 }
 
 void MachineServices::advertiseSetPositionCompare(machine::Machine& machine) {

@@ -72,6 +72,7 @@ void IoPublisher::publish(const Change& change) {
   for (const machine::OutputState& output : change.states.outputs) {
     message.output_name.push_back(output.name);
     message.output_on.push_back(output.on);
+    message.output_value.push_back(output.value);
     message.output_changed.push_back(time_of(output.changed));
     message.output_note.push_back(output.note);
     message.output_error.push_back(output.error);
