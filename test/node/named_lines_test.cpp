@@ -89,7 +89,8 @@ TEST_F(PwmOutput, HasValuesByAServiceAndByATopic) {
   EXPECT_FALSE(refused.success);
   expectSays(refused.message, "is one of a PWM output, and this is none");
   EXPECT_FALSE(setValue("pen", 1.5).success);
-  ros::Publisher publisher = ros::NodeHandle().advertise<std_msgs::Float64>(node.full("outputs/pen"), 1);
+  ros::Publisher publisher =
+      ros::NodeHandle().advertise<std_msgs::Float64>(node.full("outputs/pen"), 1);
   ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() == 1; }));
   std_msgs::Float64 message;
   for (const double value : {0.5, 2.0, 0.75, 0.0}) {

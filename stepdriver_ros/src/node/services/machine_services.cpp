@@ -27,6 +27,7 @@
 #include "node/path_request.h"
 #include "node/position_compare_request.h"
 #include "node/probe_request.h"
+#include "node/topics/output_subscriber.h"
 #include "respond.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/sim/rig.h"
