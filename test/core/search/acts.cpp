@@ -194,6 +194,8 @@ std::vector<Act> makeActs() {
          all.streamSetpoints(client, {kX, kZ});
        }},
       request("home x", machine::Home{{kX}, false}, moving({kX})),
+      request("home y", machine::Home{{kY}, false}, moving({kY})),
+      request("home z", machine::Home{{kZ}, false}, moving({kZ})),
       {"cancel homing", [](Participants& all, int client) { all.cancelHomings(client); }},
       request("plan x", machine::PlanMove{{kX, 0.004, true, 0.0}}, {}),
       request("microsteps of x", machine::SetMicrosteps{kX, 8}, moving({kX})),

@@ -335,6 +335,23 @@ TEST_P(Interleavings, KeepThePromisesOnDrawnMachines) {
   });
 }
 
+// Otherwise the search would only play homings that fail.
+TEST(Homings, OfEachMachineFindTheirPlaces) {
+  for (int variant = 0; variant < static_cast<int>(kVariants); ++variant) {
+    for (const char* const act : {"home x", "home y", "home z"}) {
+      Participants participants({variant, {{actNamed(act), 0, 0}}, {}});
+      EXPECT_EQ(participants.run(), std::vector<std::string>()) << act << ", variant " << variant;
+      ASSERT_EQ(participants.homings().size(), 1U) << act << ", variant " << variant;
+      for (const auto& outcome : participants.homings().front().outcomes) {
+        const auto result = outcome->get();
+        ASSERT_TRUE(result) << act << ", variant " << variant;
+        EXPECT_EQ(result->end, axis::HomingEnd::kHomed)
+            << act << ", variant " << variant << ": " << result->message;
+      }
+    }
+  }
+}
+
 TEST(DrawnMachines, HaveNumbersThatTheReaderAccepts) {
   std::mt19937_64 random(33);
   std::size_t differ = 0;

@@ -45,6 +45,9 @@ constexpr config::PositionCompare::Cam kToolCam{-0.001, 0.001};
 constexpr std::size_t kCompared = 1;
 /// An input with a name, which the carriage of x presses between two places. [mm]
 constexpr const char* kProbeInput = "probe";
+/// One that the carriage of z presses in passing, at this place. [mm]
+constexpr const char* kIndexInput = "index";
+constexpr double kIndexAt = 5.0;
 constexpr double kPressedFrom = 3.0;
 constexpr double kPressedTo = 12.0;
 /// How often a client looks whether a stroke of its probing has ended.
@@ -132,9 +135,19 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   if (variant == 1 || variant == kShaped) {
     homing.kind = variant == 1 ? config::HomingKind::kFlag : config::HomingKind::kFlagCentre;
     homing.input = kProbeInput;
+    // Behind the probe there are 4 mm to slow down in, which a shaper makes longer.
+    homing.seek_speed = 0.02;
+    homing.latch_speed = 0.01;
     homing.offset = kPressedFrom / 1e3;
   }
   configs[0].homing = homing;
+  homing.kind = config::HomingKind::kDirect;
+  configs[1].homing = homing;
+  homing.kind = config::HomingKind::kIndex;
+  homing.input = kIndexInput;
+  homing.at_max = true;
+  homing.offset = kIndexAt / 1e3;
+  configs[2].homing = homing;
   configs[1].backlash = 0.0004;
   configs[1].align_on_microstep_change = true;
   configs[2].jerk = 50.0;
@@ -218,6 +231,10 @@ machine::MachineOptions optionsOf(int variant) {
   probe.line = {kProbeInput, true, Bias::kAsIs};
   if (variant == 2) probe.debounce_ns = 2 * kMillisecond;
   options.inputs.push_back(probe);
+  config::InputConfig index;
+  index.name = kIndexInput;
+  index.line = {kIndexInput, true, Bias::kAsIs};
+  options.inputs.push_back(index);
   return options;
 }
 
@@ -271,6 +288,14 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
         probe.position = kPressedFrom;
         probe.end = kPressedTo;
         spec.flags.push_back(probe);
+      }
+      if (axis == 2) {
+        sim::SwitchSpec index;
+        index.line = kIndexInput;
+        index.active_level = true;
+        index.position = kIndexAt;
+        index.end = kIndexAt + 0.1;
+        spec.flags.push_back(index);
       }
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
@@ -2075,13 +2100,18 @@ void Participants::checkEnds() {
     return name.rfind("jog", 0) == 0 || open_paths_.count(move.id) != 0 ||
            move.outcome->get().has_value();
   };
+  const auto is_homed = [](const activity::AcceptedHoming& homing) {
+    return std::all_of(homing.outcomes.begin(), homing.outcomes.end(),
+                       [](const auto& outcome) { return outcome->get().has_value(); });
+  };
   const auto all_are_over = [&] {
     return controller_->snapshot()->axes.front().state.held ||
-           std::all_of(moves_.begin(), moves_.end(), is_over);
+           (std::all_of(moves_.begin(), moves_.end(), is_over) &&
+            std::all_of(homings_.begin(), homings_.end(), is_homed));
   };
   if (playUntil(all_are_over, kLongestCall)) return;
   const auto never = std::find_if_not(moves_.begin(), moves_.end(), is_over);
-  if (never != moves_.end()) oracle_.complain(never->first + " never ends");
+  oracle_.complain((never != moves_.end() ? never->first : "a homing") + " never ends");
 }
 
 void Participants::checkOutcomes() {

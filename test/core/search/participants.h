@@ -140,6 +140,7 @@ class Participants : private machine::ShellCore::Host {
   /// @param hash is given all edges; it outlives this.
   void hashTo(EdgeHash& hash) { trace_->hash = &hash; }
   /// From now on, writes down each step.
+  const std::vector<activity::AcceptedHoming>& homings() const { return homings_; }
   void keepLog() { log_ = true; }
   const std::vector<std::string>& log() const { return lines_of_log_; }
 

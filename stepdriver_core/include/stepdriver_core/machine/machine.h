@@ -323,8 +323,7 @@ class Machine {
   /// @param value of a PWM output that is on, above 0: 1 is the length of its pulses when it is on,
   ///   and smaller values are nearer to that when it is off. It changes at once whatever the least
   ///   times are.
-  /// @throw Refused if there is no such output, if it can't have the value, while the outputs are
-  /// in
+  /// @throw Refused if there is no such output or it can't have the value, while the outputs are in
   ///   their safe states, if that comes before it was switched, or if another call switches it
   ///   otherwise meanwhile.
   /// @throw GpioError if its line can't be written; then all axes have a fault.
