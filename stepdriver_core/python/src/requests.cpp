@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "stepdriver_core/error.h"
@@ -153,8 +154,19 @@ motion::PathSegment segmentOf(const py::handle& item, const std::vector<std::str
   }
   segment.velocity = item.attr("velocity").cast<double>();
   segment.tolerance = item.attr("tolerance").cast<std::optional<double>>();
-  for (const auto& [name, value] : item.attr("outputs").cast<std::map<std::string, double>>()) {
-    segment.outputs.push_back({name, value != 0.0, value != 0.0 ? value : 1.0});
+  const auto add_output = [&](const std::string& name, double value, double distance) {
+    segment.outputs.push_back({name, value != 0.0, value != 0.0 ? value : 1.0, distance});
+  };
+  const py::object outputs = item.attr("outputs");
+  if (py::isinstance<py::dict>(outputs)) {
+    for (const auto& [name, value] : outputs.cast<std::map<std::string, double>>()) {
+      add_output(name, value, 0.0);
+    }
+  } else {
+    using Place = std::tuple<std::string, double, double>;
+    for (const auto& [name, value, distance] : outputs.cast<std::vector<Place>>()) {
+      add_output(name, value, distance);
+    }
   }
   return segment;
 }

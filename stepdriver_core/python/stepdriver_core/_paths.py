@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Mapping, Optional, Sequence, Tuple, Union
 
+Outputs = Union[Mapping[str, float], Sequence[Tuple[str, float, float]]]
+"""See ``outputs`` of line()."""
+
 
 @dataclass(frozen=True)
 class PathSegment:
@@ -20,7 +23,7 @@ class PathSegment:
     control2: Sequence[float] = ()
     velocity: float = 0.0
     tolerance: Optional[float] = None
-    outputs: Mapping[str, float] = field(default_factory=dict)
+    outputs: Outputs = field(default_factory=dict)
 
 
 Segment = Union[PathSegment, Sequence[float]]
@@ -32,7 +35,7 @@ def line(
     *,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, float]] = None,
+    outputs: Optional[Outputs] = None,
 ) -> PathSegment:
     """A straight line to ``end``.
 
@@ -40,7 +43,9 @@ def line(
     velocity: the highest speed along this segment, [m/s] or [rad/s]; None: that of the path.
     tolerance: [unit] how far the corner at its end may be rounded; None: that of the path.
     outputs: outputs with a name that are switched where the segment begins, at that time and without a stop: True is
-        on, or a number between 0 and 1 for a PWM output, see ``Machine.set_output()``. A line to where the path already is switches them there, for example at its end.
+        on, or a number between 0 and 1 for a PWM output, see ``Machine.set_output()``. Or a list of tuples: the name,
+        that value, and how far along the segment that is, [m] or [rad]. A line to where the path already is switches
+        them there, for example at its end.
     """
     return PathSegment("line", end, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or {})
 
@@ -53,7 +58,7 @@ def arc_around(
     plane: Optional[Tuple[str, str]] = None,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, float]] = None,
+    outputs: Optional[Outputs] = None,
 ) -> PathSegment:
     """A circular arc around ``centre``: a full turn if both of its ends are the same. Other axes move in proportion
     to its angle.
@@ -82,7 +87,7 @@ def arc_through(
     plane: Optional[Tuple[str, str]] = None,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, float]] = None,
+    outputs: Optional[Outputs] = None,
 ) -> PathSegment:
     """A circular arc through ``point``, which lies between its begin and its end.
 
@@ -101,7 +106,7 @@ def bezier(
     *,
     velocity: Optional[float] = None,
     tolerance: Optional[float] = None,
-    outputs: Optional[Mapping[str, float]] = None,
+    outputs: Optional[Outputs] = None,
 ) -> PathSegment:
     """A cubic Bezier curve.
 

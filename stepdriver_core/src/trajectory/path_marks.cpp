@@ -107,20 +107,25 @@ void setPlaces(std::vector<PathMark>& marks, std::size_t first, const Path& path
   for (PathMark& mark : marks) {
     const std::size_t segment = mark.segment - first;
     mark.place_ns = time_ns;
-    if (segment == 0) {
-      mark.place_ns += knots.front().time_ns;
+    const auto is_passed = [&](const TimingKnot& passed) {
+      return passed.segment < segment ||
+             (passed.segment == segment && passed.parameter < mark.parameter);
+    };
+    while (knot != knots.end() && is_passed(*knot)) ++knot;
+    if (knot == knots.begin()) {
+      mark.place_ns += knot->time_ns;
       continue;
     }
-    while (knot != knots.end() && knot->segment < segment) ++knot;
-    // It ends with the last knot of the segment before it, unless that one was left out.
-    const TimingKnot& before = knot == knots.begin() ? *knot : *(knot - 1);
-    const bool is_knot = before.segment + 1 == segment && before.parameter == 1.0;
-    if (is_knot || knot == knots.begin() || knot == knots.end()) {
+    const TimingKnot& before = *(knot - 1);
+    // The end of the segment before it is a knot unless that was left out.
+    const bool at_begin = mark.parameter == 0.0;
+    const bool is_knot = at_begin && before.segment + 1 == segment && before.parameter == 1.0;
+    if (is_knot || knot == knots.end()) {
       mark.place_ns += before.time_ns;
-    } else {
-      path.evaluate(segment - 1, 1.0, point);
-      mark.place_ns += timeBetween(before, *knot, point);
+      continue;
     }
+    path.evaluate(at_begin ? segment - 1 : segment, at_begin ? 1.0 : mark.parameter, point);
+    mark.place_ns += timeBetween(before, *knot, point);
   }
 }
 

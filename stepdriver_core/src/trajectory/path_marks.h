@@ -38,7 +38,8 @@ std::string outputsText(const std::vector<PathOutput>& outputs);
 
 /// A place at which a path switches an output.
 struct PathMark {
-  std::size_t segment = 0;  ///< begins there; the number of segments: the end of the path
+  std::size_t segment = 0;  ///< it is on this one; the number of segments: the end of the path
+  double parameter = 0.0;   ///< of the segment, 0 to 1
   std::size_t output = 0;   ///< by its number
   OutputSetting setting{};
   std::size_t number = 0;     ///< of the segment that asks for it, in a refusal
@@ -46,10 +47,10 @@ struct PathMark {
   std::int64_t place_ns = 0;  ///< see Mark
 };
 
-/// Sets the places of marks: when a motion along a path passes the beginnings of their segments, as
-/// its knots say.
+/// Sets the places of marks: when a motion along a path passes them, as its knots say.
 ///
-/// @param marks by segment. @param first the number of the path's first segment among those of the
+/// @param marks by segment and parameter. @param first the number of the path's first segment among
+/// those of the
 ///   marks. @param time_ns of the first knot's time 0.
 void setPlaces(std::vector<PathMark>& marks, std::size_t first, const Path& path,
                const std::vector<TimingKnot>& knots, std::int64_t time_ns);

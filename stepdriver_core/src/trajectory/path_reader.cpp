@@ -6,7 +6,9 @@
 #include <cmath>
 #include <utility>
 
+#include "geometry/arc_length.h"
 #include "message_text.h"
+#include "path_plan.h"
 #include "printable.h"
 #include "stepdriver_core/error.h"
 
@@ -31,9 +33,10 @@ std::string segmentText(std::size_t index) { return fmt::format("segment {} of t
 
 void PathReader::read(const PathSegment& given, std::vector<CurveSegment>& segments) {
   CurveSegment segment = segmentOf(given);
-  if (!given.outputs.empty()) readOutputs(given, segments.size());
+  const bool leads_nowhere = leadsNowhere(given, segment);
+  if (!given.outputs.empty()) readOutputs(given, segment, leads_nowhere, segments.size());
   ++index_;
-  if (!leadsNowhere(given, segment)) {
+  if (!leads_nowhere) {
     before_ = segment.end;
     segments.push_back(std::move(segment));
   } else if (!segments.empty()) {
@@ -64,9 +67,10 @@ CurveSegment PathReader::segmentOf(const PathSegment& given) const {
   return segment;
 }
 
-void PathReader::readOutputs(const PathSegment& given, std::size_t segment) {
+void PathReader::readOutputs(const PathSegment& given, const CurveSegment& segment,
+                             bool leads_nowhere, std::size_t number) {
   const std::vector<PathOutput>& outputs = *frame_.outputs;
-  const std::size_t first = marks_.size();
+  const auto first = static_cast<std::ptrdiff_t>(marks_.size());
   for (const OutputSwitch& wanted : given.outputs) {
     const auto found = std::find_if(outputs.begin(), outputs.end(), [&](const PathOutput& output) {
       return output.name == wanted.output;
@@ -75,17 +79,39 @@ void PathReader::readOutputs(const PathSegment& given, std::size_t segment) {
       refuse(fmt::format("switches the output {}, but {}", printable(wanted.output),
                          outputsText(outputs)));
     }
-    const auto number = static_cast<std::size_t>(found - outputs.begin());
-    const bool twice =
-        std::any_of(marks_.begin() + static_cast<std::ptrdiff_t>(first), marks_.end(),
-                    [&](const PathMark& mark) { return mark.output == number; });
-    if (twice) refuse(fmt::format("switches the output {} twice", wanted.output));
-    PathMark& mark = marks_.emplace_back();
-    mark.segment = segment;
-    mark.output = number;
+    PathMark mark;
+    mark.segment = number;
+    mark.parameter = parameterOf(wanted, segment, leads_nowhere);
+    mark.output = static_cast<std::size_t>(found - outputs.begin());
     mark.setting = settingOf(wanted, found->is_pwm);
     mark.number = index_;
+    const bool twice =
+        std::any_of(marks_.begin() + first, marks_.end(), [&](const PathMark& other) {
+          return other.output == mark.output && other.parameter == mark.parameter;
+        });
+    if (twice) refuse(fmt::format("switches the output {} twice", wanted.output));
+    marks_.push_back(mark);
   }
+  std::stable_sort(
+      marks_.begin() + first, marks_.end(),
+      [](const PathMark& one, const PathMark& other) { return one.parameter < other.parameter; });
+}
+
+double PathReader::parameterOf(const OutputSwitch& wanted, const CurveSegment& segment,
+                               bool leads_nowhere) const {
+  if (wanted.distance == 0.0) return 0.0;
+  const auto refuse_beyond = [&](double length) {
+    refuse(
+        fmt::format("switches the output {} at {} m or rad, but must do so at 0 to {}, its length",
+                    wanted.output, numberText(wanted.distance), upperBoundText(length)));
+  };
+  if (leads_nowhere) refuse_beyond(0.0);
+  const Path alone(before_, {segment}, resolutionOf(axes_));
+  const ArcLength way(alone, 0, segment.measured);
+  if (!(wanted.distance > 0.0)) refuse_beyond(way.length());
+  const std::optional<double> parameter = way.parameterAt(wanted.distance);
+  if (!parameter) refuse_beyond(way.length());
+  return *parameter;
 }
 
 OutputSetting PathReader::settingOf(const OutputSwitch& wanted, bool is_pwm) const {

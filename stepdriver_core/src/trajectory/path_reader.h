@@ -53,7 +53,10 @@ class PathReader {
                      const std::array<double, 2>& centre, const std::array<double, 2>& to) const;
   bool areSame(const std::array<std::size_t, 2>& plane, const std::array<double, 2>& from,
                const std::array<double, 2>& to) const;
-  void readOutputs(const PathSegment& given, std::size_t segment);
+  void readOutputs(const PathSegment& given, const CurveSegment& segment, bool leads_nowhere,
+                   std::size_t number);
+  double parameterOf(const OutputSwitch& wanted, const CurveSegment& segment,
+                     bool leads_nowhere) const;
   OutputSetting settingOf(const OutputSwitch& wanted, bool is_pwm) const;
   bool leadsNowhere(const PathSegment& given, const CurveSegment& segment) const;
   void requireRate(double velocity, double finest, const char* unit) const;

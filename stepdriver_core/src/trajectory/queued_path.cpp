@@ -335,11 +335,16 @@ std::optional<QueuedPath::Continuation> QueuedPath::continueFrom(Start start, co
   return std::nullopt;
 }
 
+bool QueuedPath::isBeyond(const PathMark& mark, const Start& start) {
+  return mark.segment > start.segment ||
+         (mark.segment == start.segment && mark.parameter > start.begin.parameter);
+}
+
 // Those that the new plan passes at other times: all new ones, and those beyond the start.
 std::vector<PathMark> QueuedPath::marksAfter(const Start& start, const Added& added) const {
   std::vector<PathMark> marks;
   for (const PathMark& mark : window_->marks) {
-    if (mark.segment > start.segment) marks.push_back(mark);
+    if (isBeyond(mark, start)) marks.push_back(mark);
   }
   for (PathMark& mark : marks) mark.appended_to = true;
   marks.insert(marks.end(), added.marks.begin(), added.marks.end());
@@ -511,7 +516,7 @@ void QueuedPath::keepMarks(PathWindow& window, const Start& start, std::size_t d
   window.marks_passed = window_->marks_passed;
   window.marks_passed.resize(window.frame.outputs->size());
   for (const PathMark& mark : window_->marks) {
-    if (mark.segment > start.segment) continue;
+    if (isBeyond(mark, start)) continue;
     if (mark.place_ns < passed_ns - margin) {
       ++window.marks_passed[mark.output];
     } else {
@@ -521,7 +526,11 @@ void QueuedPath::keepMarks(PathWindow& window, const Start& start, std::size_t d
   }
   window.marks.insert(window.marks.end(), later.begin(), later.end());
   requireRates(window.marks, *window.frame.outputs);
-  for (PathMark& mark : window.marks) mark.segment -= std::min(mark.segment, dropped);
+  for (PathMark& mark : window.marks) {
+    // Those of segments that are dropped are passed, wherever they were.
+    if (mark.segment < dropped) mark.parameter = 0.0;
+    mark.segment -= std::min(mark.segment, dropped);
+  }
 }
 
 // What was appended leads nowhere, and switches outputs at the end of the path.

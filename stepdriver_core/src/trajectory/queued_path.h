@@ -136,6 +136,7 @@ class QueuedPath : public SharedPath {
   void keepMarks(PathWindow& window, const Start& start, std::size_t dropped,
                  std::vector<PathMark> later, std::int64_t passed_ns) const;
   Longer withMarksAtEnd(std::vector<PathMark> added, bool more_follows, double passed) const;
+  static bool isBeyond(const PathMark& mark, const Start& start);
   std::vector<PathMark> marksAfter(const Start& start, const Added& added) const;
   JointPlace jointAt(const Start& start, const PathPoint& place) const;
   void adjust(Start& start, const PathPoint& planned, const std::vector<PathStart>& states) const;

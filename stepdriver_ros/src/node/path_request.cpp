@@ -57,7 +57,7 @@ motion::PathSegment segmentOf(const PathSegment& fields, std::size_t index) {
   }
   for (const OutputSwitch& output : fields.outputs) {
     segment.outputs.push_back(
-        {output.name, output.on != 0, output.value == 0.0 ? 1.0 : output.value});
+        {output.name, output.on != 0, output.value == 0.0 ? 1.0 : output.value, output.distance});
   }
   return segment;
 }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstddef>
@@ -161,6 +162,123 @@ TEST_F(PathOutputs, AreSwitchedAtTheNanosecondOfTheirPlacesWithoutAStop) {
   }
   expectWithSteps({100, 200, 700, 707, 1500});
   expectAtRest();
+}
+
+TEST_F(PathOutputs, AreSwitchedAtDistancesAlongASegment) {
+  const std::vector<std::int64_t> counts{100, 200, 700, 707, 1500};
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0005};
+  request.segments = {lineTo({stepTo(1900), 0.0}), lineTo({stepTo(2000), 0.0})};
+  // In any order.
+  for (const std::size_t i : {4U, 2U, 0U, 3U, 1U}) {
+    request.segments[0].outputs.push_back({"pen", i % 2 == 0, 1.0, stepTo(counts[i])});
+  }
+  request.segments[1].outputs = {{"pen", false}, {"pen", true, 1.0, stepTo(1950) - stepTo(1900)}};
+  const CoordinatedResult result = finish(request);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.marks_made, 7U);
+  std::vector<std::int64_t> all = counts;
+  all.insert(all.end(), {1900, 1950});
+  expectWithSteps(all);
+  expectAtRest();
+}
+
+// Where the steps have brought the axes at a time, and where a curve is at a distance, by many
+// short lines.
+TEST_F(PathOutputs, AreSwitchedAtDistancesAlongCurves) {
+  constexpr double kRight = 1.5707963267948966;
+  const auto on_arc = [](double part) {
+    return std::array<double, 2>{0.02 * std::sin(kRight * part),
+                                 0.02 - 0.02 * std::cos(kRight * part)};
+  };
+  const auto on_bezier = [](double u) {
+    const double v = 1.0 - u;
+    const double a = 3.0 * v * v * u;
+    const double b = 3.0 * v * u * u;
+    return std::array<double, 2>{a * 0.03 + b * 0.04 + u * u * u * 0.02,
+                                 b * 0.01 + u * u * u * 0.03};
+  };
+  PathSegment arc = test::arcTo({0.02, 0.02}, {0.0, 0.02});
+  PathSegment bezier = lineTo({0.02, 0.03});
+  bezier.shape = PathSegment::Shape::kBezier;
+  bezier.control1 = {0.03, 0.0};
+  bezier.control2 = {0.04, 0.01};
+  const auto check = [&](const PathSegment& segment, const auto& place) {
+    begin();
+    constexpr int kLines = 200'000;
+    const std::vector<double> distances{1e-6, 0.003, 0.0071, 0.02, 0.0301};
+    PathRequest request{{"x", "y"}, {segment}, false, 0.0, 0.0005};
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      request.segments[0].outputs.push_back({"pen", i % 2 == 0, 1.0, distances[i]});
+    }
+    const CoordinatedResult result = finish(request);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    const std::vector<std::int64_t> times = edges();
+    ASSERT_EQ(times.size(), distances.size());
+    double length = 0.0;
+    std::size_t next = 0;
+    for (int k = 1; k <= kLines && next < distances.size(); ++k) {
+      const auto from = place(static_cast<double>(k - 1) / kLines);
+      const auto to = place(static_cast<double>(k) / kLines);
+      length += std::hypot(to[0] - from[0], to[1] - from[1]);
+      if (length < distances[next]) continue;
+      for (const std::size_t axis : {0U, 1U}) {
+        std::int64_t count = 0;
+        for (const Step& step : steps(axis == 0 ? "x" : "y")) {
+          if (step.time_ns <= times[next]) count = step.count;
+        }
+        EXPECT_NEAR(static_cast<double>(count) * kMicrostep, to[axis], 0.55 * kMicrostep)
+            << distances[next] << " m, axis " << axis;
+      }
+      ++next;
+    }
+    EXPECT_EQ(next, distances.size());
+  };
+  check(arc, on_arc);
+  check(bezier, on_bezier);
+}
+
+TEST_F(PathOutputs, AtADistanceBeyondTheirSegmentAreRefused) {
+  const auto switched_at = [](double distance) {
+    PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0005};
+    request.segments = {lineTo({0.01, 0.0}),
+                        with(lineTo({0.01, 0.02}), {{"pen", true, 1.0, distance}})};
+    return request;
+  };
+  for (const double distance : {-1e-300, -1.0, 0.0200001, 1e300, kNan}) {
+    EXPECT_REFUSED(bench->machine->followPath(switched_at(distance)),
+                   "segment 1 of the path switches the output pen at ");
+    EXPECT_REFUSED(bench->machine->followPath(switched_at(distance)),
+                   "m or rad, but must do so at 0 to 0.02, its length");
+  }
+  EXPECT_EQ(finish(switched_at(0.02)).marks_made, 1U);
+  PathRequest nowhere = switched_at(0.0);
+  nowhere.segments.push_back(with(lineTo({0.01, 0.02}), {{"pen", false, 1.0, 1e-9}}));
+  EXPECT_REFUSED(bench->machine->followPath(nowhere), "at 0 to 0, its length");
+  PathRequest twice = switched_at(0.005);
+  twice.segments[1].outputs.push_back({"pen", false, 1.0, 0.005});
+  EXPECT_REFUSED(bench->machine->followPath(twice), "switches the output pen twice");
+}
+
+// The new plan passes those that are still ahead on the last segment at other times.
+TEST_F(PathOutputs, AtDistancesComeOnceIfThePathIsContinuedAmongThem) {
+  for (const double appended_after : {0.05, 0.1, 0.2, 0.3, 0.4, 0.5}) {
+    begin();
+    const std::vector<std::int64_t> counts{300, 900, 1500, 2100, 2700, 3100, 3300};
+    PathRequest request{{"x", "y"}, {lineTo({stepTo(3200), 0.0})}, false, 0.0, 0.0005, true};
+    for (std::size_t i = 0; i + 1 < counts.size(); ++i) {
+      request.segments[0].outputs.push_back({"pen", i % 2 == 0, 1.0, stepTo(counts[i])});
+    }
+    const CoordinatedMove move = bench->machine->followPath(request);
+    bench->machine->advance(appended_after);
+    const double distance = stepTo(3300) - stepTo(3200);
+    bench->machine->appendPath(
+        {move.id(), {with(lineTo({stepTo(4000), 0.0}), {{"pen", true, 1.0, distance}})}, false});
+    const CoordinatedResult result = bench->machine->wait(move);
+    EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+    EXPECT_EQ(result.marks_made, 7U) << appended_after;
+    EXPECT_EQ(result.marks_not_made, 0U);
+    expectWithSteps(counts);
+  }
 }
 
 TEST_F(PathOutputs, AreSwitchedInTheMiddleOfARoundedCorner) {

@@ -59,6 +59,8 @@ struct OutputSwitch {
   std::string output;
   bool on = false;
   double value = 1.0;  ///< of a PWM output that is on: see Machine::setOutput()
+  /// [unit] Along its segment, from its begin, as PathRequest::velocity counts the way.
+  double distance = 0.0;
 };
 
 /// How much earlier than at their places a path switches an output: what a valve or a pump needs.
@@ -103,9 +105,9 @@ struct PathSegment {
   /// [unit] PathRequest::tolerance for the corner at its end; empty: that one.
   std::optional<double> tolerance;
 
-  /// Outputs that are switched where it begins, each at most once: in the middle of a corner that
-  /// is rounded, and without a stop. A segment that leads nowhere switches them where it is, for
-  /// example at the end of a path.
+  /// Outputs that are switched where it begins or on its way, each at most once at a place, and
+  /// without a stop. The begin is the middle of a corner that is rounded. A segment that leads
+  /// nowhere switches them where it is, for example at the end of a path.
   std::vector<OutputSwitch> outputs{};
 };
 
