@@ -526,9 +526,9 @@ check_fuzz() { await build_fuzz && bash "$root/scripts/fuzz.sh" --repeatable; }
 # All of it stays in the group that an interrupt ends.
 build_fuzz() { in_group=1 bash "$root/scripts/fuzz.sh" --build; }
 
-# The rooms that depend most on the processor. The tests of the motions take minutes there: the comparison
+# The room that depends most on the processor. The tests of the motions take minutes there: the comparison
 # of step times stands for them. scripts/cross.sh tests all rooms.
-rooms_for_arm64=(config driver pulse)
+rooms_for_arm64=(pulse)
 build_arm64() { in_group=1 bash "$root/scripts/cross.sh" --build arm64 "${rooms_for_arm64[@]}"; }
 # cross ARGUMENT...: if this computer can't have the compiler, the libraries or the emulator, it is skipped.
 cross() {

@@ -67,6 +67,13 @@ class OutputsAndInputs(support.MachineTest):
             with self.assertRaisesRegex(Refused, "pan|pen"):
                 self.machine.follow_path(["x"], [line([0.07], outputs=outputs)], leads=leads)
 
+    def test_a_path_switches_outputs_at_distances_along_its_segments(self):
+        self.machine.follow_path(["x"], [line([0.05], outputs=[("lamp", False, 0.04), ("lamp", True, 0.01)])]).wait()
+        self.assertFalse(self.machine.outputs["lamp"].on)
+        self.assertIsNotNone(self.machine.outputs["lamp"].changed)
+        with self.assertRaisesRegex(Refused, "at 0.03 m or rad, but must do so at 0 to 0.02, its length"):
+            self.machine.follow_path(["x"], [line([0.07], outputs=[("lamp", True, 0.03)])])
+
     def test_the_position_of_an_axis_switches_an_output(self):
         x = self.machine["x"]
         x.set_position(0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Mapping, Optional, Sequence, Tuple, Union
 
 Outputs = Union[Mapping[str, float], Sequence[Tuple[str, float, float]]]
@@ -23,7 +23,7 @@ class PathSegment:
     control2: Sequence[float] = ()
     velocity: float = 0.0
     tolerance: Optional[float] = None
-    outputs: Outputs = field(default_factory=dict)
+    outputs: Outputs = ()
 
 
 Segment = Union[PathSegment, Sequence[float]]
@@ -47,7 +47,7 @@ def line(
         that value, and how far along the segment that is, [m] or [rad]. A line to where the path already is switches
         them there, for example at its end.
     """
-    return PathSegment("line", end, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or {})
+    return PathSegment("line", end, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or ())
 
 
 def arc_around(
@@ -76,7 +76,7 @@ def arc_around(
         clockwise,
         velocity=velocity or 0.0,
         tolerance=tolerance,
-        outputs=outputs or {},
+        outputs=outputs or (),
     )
 
 
@@ -95,7 +95,7 @@ def arc_through(
     The others: as for arc_around().
     """
     return PathSegment(
-        "arc_through", end, plane, point, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or {}
+        "arc_through", end, plane, point, velocity=velocity or 0.0, tolerance=tolerance, outputs=outputs or ()
     )
 
 
@@ -120,5 +120,5 @@ def bezier(
         control2=control2,
         velocity=velocity or 0.0,
         tolerance=tolerance,
-        outputs=outputs or {},
+        outputs=outputs or (),
     )
