@@ -328,7 +328,8 @@ std::string TmcChip::takePoll(const bus::RegisterDone& done) {
   std::uint32_t flags = done.values.front();
   if (tmc::isOnSpi(settings_.model) && done.values.at(2) != chopconf_) flags |= tmc::kGstatReset;
   takeStatus(status);
-  mscnt_ = static_cast<int>(done.values.back());  // if it was asked for
+  constexpr std::size_t with_mscnt = 4;  // poll(true)
+  if (done.values.size() == with_mscnt) mscnt_ = static_cast<int>(done.values.back());
   std::string fault = faultOf(flags, status);
   const bool is_changed =
       !tmc::isOnSpi(settings_.model) && done.values.at(2) != tmc::gconfOf(settings_);

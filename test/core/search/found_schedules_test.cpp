@@ -34,6 +34,11 @@ void expectGood(const Schedule& schedule) {
   }
 }
 
+TEST(FoundSchedules, APollThatDoesNotAskForTheMicrostepCounterLeavesItAsItWas) {
+  expectGood(
+      {kRegisters, {does(1, 0, "resume"), does(0, 0, "microsteps of x")}, {{20, Who::kNews, 40}}});
+}
+
 TEST(FoundSchedules, AMoveThatComesWhileAnAxisIsPutToSleepDoesNotStep) {
   expectGood({1, {does(0, 0, "sleep x"), does(1, 1, "move x by a round")}, {{3, Who::kNews, 40}}});
   expectGood({1, {does(0, 0, "sleep x"), does(1, 1, "move x to 8 mm")}, {{3, Who::kWriter, 10}}});

@@ -143,6 +143,7 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   configs[0].homing = homing;
   homing.kind = config::HomingKind::kDirect;
   configs[1].homing = homing;
+  configs[1].homing->order = 1;  // the motors of x may be its own too
   homing.kind = config::HomingKind::kIndex;
   homing.input = kIndexInput;
   homing.at_max = true;
