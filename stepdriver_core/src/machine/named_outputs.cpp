@@ -28,8 +28,8 @@ NamedOutput::NamedOutput(const config::OutputConfig& config, std::size_t number,
 
 void NamedOutput::set(const OutputSetting& setting, const SharedCall& call) {
   if (setting != wanted_) {
-    refuseCalls(fmt::format("another command switches it {}",
-                            switchText(setting.on, setting.on ? setting.value() : 1.0)));
+    refuseCalls(
+        fmt::format("another command switches it {}", switchText(setting.on, setting.value())));
   }
   wanted_ = setting;
   state_.note.clear();

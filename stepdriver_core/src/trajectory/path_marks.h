@@ -49,9 +49,9 @@ struct PathMark {
 
 /// Sets the places of marks: when a motion along a path passes them, as its knots say.
 ///
-/// @param marks by segment and parameter. @param first the number of the path's first segment among
-/// those of the
-///   marks. @param time_ns of the first knot's time 0.
+/// @param marks by segment and parameter.
+/// @param first the number of the path's first segment among those of the marks.
+/// @param time_ns of the first knot's time 0.
 void setPlaces(std::vector<PathMark>& marks, std::size_t first, const Path& path,
                const std::vector<TimingKnot>& knots, std::int64_t time_ns);
 

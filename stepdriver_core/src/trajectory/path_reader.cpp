@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
-#include "geometry/arc_length.h"
 #include "message_text.h"
 #include "path_plan.h"
 #include "printable.h"
@@ -71,6 +71,19 @@ void PathReader::readOutputs(const PathSegment& given, const CurveSegment& segme
                              bool leads_nowhere, std::size_t number) {
   const std::vector<PathOutput>& outputs = *frame_.outputs;
   const auto first = static_cast<std::ptrdiff_t>(marks_.size());
+  std::optional<Path> alone;
+  std::optional<ArcLength> way;
+  const bool has_distances =
+      std::any_of(given.outputs.begin(), given.outputs.end(),
+                  [](const OutputSwitch& wanted) { return wanted.distance != 0.0; });
+  if (has_distances && !leads_nowhere) {
+    try {
+      alone.emplace(before_, std::vector<CurveSegment>{segment}, resolutionOf(axes_));
+    } catch (const Malformed& error) {
+      throw Refused(error.what());
+    }
+    way.emplace(*alone, 0, segment.measured);
+  }
   for (const OutputSwitch& wanted : given.outputs) {
     const auto found = std::find_if(outputs.begin(), outputs.end(), [&](const PathOutput& output) {
       return output.name == wanted.output;
@@ -81,37 +94,32 @@ void PathReader::readOutputs(const PathSegment& given, const CurveSegment& segme
     }
     PathMark mark;
     mark.segment = number;
-    mark.parameter = parameterOf(wanted, segment, leads_nowhere);
+    mark.parameter = parameterOf(wanted, way ? &*way : nullptr);
     mark.output = static_cast<std::size_t>(found - outputs.begin());
     mark.setting = settingOf(wanted, found->is_pwm);
     mark.number = index_;
-    const bool twice =
-        std::any_of(marks_.begin() + first, marks_.end(), [&](const PathMark& other) {
-          return other.output == mark.output && other.parameter == mark.parameter;
-        });
-    if (twice) refuse(fmt::format("switches the output {} twice", wanted.output));
     marks_.push_back(mark);
   }
-  std::stable_sort(
+  const auto place_of = [](const PathMark& mark) { return std::pair(mark.parameter, mark.output); };
+  std::sort(marks_.begin() + first, marks_.end(), [&](const PathMark& one, const PathMark& other) {
+    return place_of(one) < place_of(other);
+  });
+  const auto twice = std::adjacent_find(
       marks_.begin() + first, marks_.end(),
-      [](const PathMark& one, const PathMark& other) { return one.parameter < other.parameter; });
+      [&](const PathMark& one, const PathMark& other) { return place_of(one) == place_of(other); });
+  if (twice != marks_.end()) {
+    refuse(fmt::format("switches the output {} twice", outputs[twice->output].name));
+  }
 }
 
-double PathReader::parameterOf(const OutputSwitch& wanted, const CurveSegment& segment,
-                               bool leads_nowhere) const {
+double PathReader::parameterOf(const OutputSwitch& wanted, const ArcLength* way) const {
   if (wanted.distance == 0.0) return 0.0;
-  const auto refuse_beyond = [&](double length) {
-    refuse(
-        fmt::format("switches the output {} at {} m or rad, but must do so at 0 to {}, its length",
-                    wanted.output, numberText(wanted.distance), upperBoundText(length)));
-  };
-  if (leads_nowhere) refuse_beyond(0.0);
-  const Path alone(before_, {segment}, resolutionOf(axes_));
-  const ArcLength way(alone, 0, segment.measured);
-  if (!(wanted.distance > 0.0)) refuse_beyond(way.length());
-  const std::optional<double> parameter = way.parameterAt(wanted.distance);
-  if (!parameter) refuse_beyond(way.length());
-  return *parameter;
+  const double length = way != nullptr ? way->length() : 0.0;
+  const auto parameter =
+      way != nullptr && wanted.distance > 0.0 ? way->parameterAt(wanted.distance) : std::nullopt;
+  if (parameter) return *parameter;
+  refuse(fmt::format("switches the output {} at {} m or rad, but must do so at 0 to {}, its length",
+                     wanted.output, numberText(wanted.distance), upperBoundText(length)));
 }
 
 OutputSetting PathReader::settingOf(const OutputSwitch& wanted, bool is_pwm) const {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/arc_length.h"
 #include "geometry/path.h"
 #include "path_axis.h"
 #include "path_marks.h"
@@ -55,8 +56,8 @@ class PathReader {
                const std::array<double, 2>& to) const;
   void readOutputs(const PathSegment& given, const CurveSegment& segment, bool leads_nowhere,
                    std::size_t number);
-  double parameterOf(const OutputSwitch& wanted, const CurveSegment& segment,
-                     bool leads_nowhere) const;
+  /// @param way nullptr: the segment leads nowhere.
+  double parameterOf(const OutputSwitch& wanted, const ArcLength* way) const;
   OutputSetting settingOf(const OutputSwitch& wanted, bool is_pwm) const;
   bool leadsNowhere(const PathSegment& given, const CurveSegment& segment) const;
   void requireRate(double velocity, double finest, const char* unit) const;

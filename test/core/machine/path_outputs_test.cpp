@@ -257,6 +257,13 @@ TEST_F(PathOutputs, AtADistanceBeyondTheirSegmentAreRefused) {
   PathRequest twice = switched_at(0.005);
   twice.segments[1].outputs.push_back({"pen", false, 1.0, 0.005});
   EXPECT_REFUSED(bench->machine->followPath(twice), "switches the output pen twice");
+  // A curve that no axis can pass without a stop.
+  PathRequest cusp{{"x", "y"}, {lineTo({0.01, 0.0})}, true, 0.0, 0.0005};
+  cusp.segments[0].shape = PathSegment::Shape::kBezier;
+  cusp.segments[0].control1 = {0.01, 0.01};
+  cusp.segments[0].control2 = {0.0, 0.01};
+  cusp.segments[0].outputs = {{"pen", true, 1.0, 0.001}};
+  EXPECT_REFUSED(bench->machine->followPath(cusp), "segment 0 is a Bezier with a cusp");
 }
 
 // The new plan passes those that are still ahead on the last segment at other times.

@@ -10,7 +10,7 @@ namespace stepdriver::machine {
 struct SetOutput {
   std::string name;
   bool on = false;
-  double value = 1.0;  // of a PWM output that is on
+  double value = 1.0;  // see Machine::setOutput()
 
   static constexpr bool kReadsInputs = true;
   std::string text(const AxisWords& axes) const;
