@@ -11,7 +11,7 @@ namespace {
 // falls with the fourth power of this number, and is far below a microstep.
 constexpr std::size_t kParts = 256;
 // What rounding may add to the length of a segment.
-constexpr double kRounding = 1e-9;
+constexpr double kLengthRounding = 1e-9;
 
 double begin(std::size_t part) { return static_cast<double>(part) / kParts; }
 
@@ -27,7 +27,7 @@ ArcLength::ArcLength(const Path& path, std::size_t segment, std::vector<bool> me
 }
 
 std::optional<double> ArcLength::parameterAt(double distance) const {
-  if (distance > length() * (1.0 + kRounding)) return {};
+  if (distance > length() * (1.0 + kLengthRounding)) return {};
   const auto found = std::lower_bound(lengths_.begin(), lengths_.end(), distance);
   if (found == lengths_.end()) return 1.0;
   const auto part = static_cast<std::size_t>(found - lengths_.begin());
