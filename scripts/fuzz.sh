@@ -86,9 +86,10 @@ fuzz_cpp() {
   if [[ -n $repeatable ]]; then
     # libFuzzer also looks at the depth of the stack, which depends on its address: on the environment, on the
     # paths and on the kernel's randomization. Nothing may depend on the time either, or on the order of a
-    # folder's files. What is found stays in memory.
+    # folder's files. What is found stays in memory. Leaks are looked for at the end only: libFuzzer plays an
+    # input again if the allocations of all threads don't match while it runs, also those of its own thread.
     "${at_fixed_addresses[@]}" env -i PATH=/usr/bin:/bin "${sanitizer_options[@]}" "programs/${name}_fuzz" \
-      "${common_options[@]}" "-runs=$runs" -max_total_time=0 -reload=0 -timeout=1200 \
+      "${common_options[@]}" "-runs=$runs" -max_total_time=0 -reload=0 -timeout=1200 -detect_leaks=0 \
       "-seed_inputs=$(printf '%s\n' "sources/corpus/$name"/* | LC_ALL=C sort | paste -s -d ,)"
   else
     env "${sanitizer_options[@]}" "programs/${name}_fuzz" "${common_options[@]}" "-max_total_time=$seconds" \
