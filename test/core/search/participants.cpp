@@ -48,6 +48,11 @@ constexpr const char* kProbeInput = "probe";
 /// One that the carriage of z presses in passing, at this place. [mm]
 constexpr const char* kIndexInput = "index";
 constexpr double kIndexAt = 5.0;
+/// One that is active while a block stops x.
+constexpr const char* kBlockInput = "block";
+/// [mm] Where the switches are.
+constexpr double kMinAt = -9.0;
+constexpr double kMaxAt = 16.0;
 constexpr double kPressedFrom = 3.0;
 constexpr double kPressedTo = 12.0;
 /// How often a client looks whether a stroke of its probing has ended.
@@ -76,8 +81,8 @@ constexpr pulse::Nanoseconds kAccess = 3 * kMillisecond;
 constexpr pulse::Nanoseconds kSilence = 90 * kMillisecond;
 /// Each trouble of a chip is known after this time.
 constexpr pulse::Nanoseconds kTroubleIsKnown = 1'500 * kMillisecond;
-/// [mm] Where a block stops x if it is homed by a stall: it has no min switch.
-constexpr double kBlock = -9.0;
+/// [mm] Where a block stops x if it is homed against it: it has no min switch.
+constexpr double kBlock = kMinAt;
 
 /// In this variant x and y share their motors, as on a CoreXY.
 constexpr int kSharing = 3;
@@ -86,6 +91,17 @@ constexpr int kShaped = 4;
 
 bool hasRegisters(const std::vector<config::AxisConfig>& configs) {
   return configs.front().tmc.has_value();
+}
+
+constexpr int kHalfSteps = 2;
+
+bool hasPhases(const config::AxisConfig& config) {
+  return config.driver.step_inputs == driver::StepInputs::kPhases;
+}
+
+bool meetsBlock(const config::AxisConfig& config) {
+  return config.homing && (config.homing->kind == config::HomingKind::kStall ||
+                           config.homing->kind == config::HomingKind::kBlock);
 }
 
 int microstepsOf(std::uint32_t chopconf) {
@@ -113,6 +129,37 @@ config::AxisConfig axisWithRegisters() {
   config.homing->offset = kBlock / 1e3;
   config.homing->max_travel = 0.04;
   return config;
+}
+
+/// The motors and switches of kPhases.
+void makePhases(std::vector<config::AxisConfig>& configs) {
+  config::AxisConfig& x = configs[0];
+  x.endstop_min.reset();
+  x.min_position = kBlock / 1e3 + 0.0005;
+  x.homing->kind = config::HomingKind::kBlock;
+  x.homing->input = kBlockInput;
+  x.homing->approaches = 2;
+  x.homing->pull_off = 0.002;
+  config::AxisConfig& y = configs[1];
+  y.driver = driver::driverChip("uln2003");
+  y.microsteps = kHalfSteps;
+  y.pins = {};
+  y.pins.in1.line = "y.in1";
+  y.pins.in2.line = "y.in2";
+  y.pins.in3.line = "y.in3";
+  y.pins.in4.line = "y.in4";
+  y.fault.reset();
+  y.homing->kind = config::HomingKind::kLimit;
+  config::AxisConfig& z = configs[2];
+  z.homing->kind = config::HomingKind::kLimit;
+  z.homing->input.clear();
+  z.homing->offset = kMaxAt / 1e3;
+  z.homing->order = 2;
+  z.switch_release = 0.001;
+  for (auto* endstop : {&y.endstop_min, &z.endstop_min, &z.endstop_max}) {
+    (*endstop)->line = "ends";
+    (*endstop)->shared = true;
+  }
 }
 
 }  // namespace
@@ -156,8 +203,12 @@ std::vector<config::AxisConfig> configsOf(int variant) {
   configs[2].driver.in_position_active = true;
   configs[2].in_position = config::InPositionPin{"z.in_position", Bias::kAsIs, 0.05};
   if (variant == kRegisters) configs[0] = axisWithRegisters();
-  if (variant != 1) configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
-  if (variant != 0) configs[2].idle_action = config::IdleAction::kSleep;
+  if (variant == kPhases) makePhases(configs);
+  if (variant != 1 && variant != kPhases) {
+    configs[0].pins.enable.line = configs[1].pins.enable.line = "both.enable";
+  }
+  // It may jump by full steps, onto a switch of which nobody knows the end.
+  if (variant != 0 && variant != kPhases) configs[2].idle_action = config::IdleAction::kSleep;
   if (variant == 1) {
     configs[0].driver.fault_end = driver::FaultEnd::kEnable;
     configs[0].fault_ramps = true;
@@ -200,6 +251,7 @@ machine::EmergencyDisable emergencyDisableOf(int variant) {
     case kShaped:
       return machine::EmergencyDisable::kRamp;
     case 2:
+    case kPhases:
       return machine::EmergencyDisable::kOff;
     default:
       return machine::EmergencyDisable::kHold;
@@ -236,6 +288,12 @@ machine::MachineOptions optionsOf(int variant) {
   index.name = kIndexInput;
   index.line = {kIndexInput, true, Bias::kAsIs};
   options.inputs.push_back(index);
+  if (variant == kPhases) {
+    config::InputConfig block;
+    block.name = kBlockInput;
+    block.line = {kBlockInput, true, Bias::kAsIs};
+    options.inputs.push_back(block);
+  }
   return options;
 }
 
@@ -278,8 +336,8 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
   for (std::size_t axis = 0; axis < configs.size(); ++axis) {
     const config::AxisConfig& config = configs[axis];
     for (sim::RigAxisSpec& spec : test::rigMotors(config)) {
-      if (spec.min_switch) spec.min_switch->position = -9.0;
-      spec.max_switch->position = 16.0;
+      if (spec.min_switch) spec.min_switch->position = kMinAt;
+      spec.max_switch->position = kMaxAt;
       spec.settling_ns = 5 * kMillisecond;
       if (config.brake) spec.load_falls = kLoadFalls;
       if (spec.name == configs[0].name) {
@@ -300,8 +358,9 @@ std::vector<sim::RigAxisSpec> rigOf(const std::vector<config::AxisConfig>& confi
       }
       if (spec.name != config.name) spec.start = kRacked;
       spec.limits = setup::motorLimits(configs, axis);
+      if (meetsBlock(config)) spec.block_min = kBlock;
+      if (meetsBlock(config) && !config.tmc) spec.stall_line = kBlockInput;
       if (config.tmc) {
-        spec.block_min = kBlock;
         spec.motor = sim::soundMotor({}, spec.limits->rate / config.microsteps,
                                      spec.limits->acceleration / config.microsteps);
       }
@@ -329,6 +388,12 @@ double timeOfFullStep(const config::AxisConfig& config) {
                 std::sqrt(2.0 * step * (1.0 / config.acceleration + 1.0 / config.deceleration));
   if (config.jerk > 0.0) time += 4.0 * std::cbrt(0.5 * step / config.jerk);
   return time;
+}
+
+/// No port that takes steps ahead of time switches coils.
+Schedule playable(Schedule schedule) {
+  if (schedule.variant == kPhases) schedule.ahead.reset();
+  return schedule;
 }
 
 /// For each axis, the longest deceleration and 10 %, and the time of its shaper.
@@ -364,11 +429,11 @@ const char* nameOf(Who who) {
 }
 
 Participants::Participants(const Schedule& schedule)
-    : schedule_(schedule),
+    : schedule_(playable(schedule)),
       configs_(schedule.machine.empty() ? configsOf(schedule.variant) : schedule.machine),
-      oracle_(slowingOf(configs_, schedule), [this] { return engine_->state().slipped; }),
+      oracle_(slowingOf(configs_, schedule_), [this] { return engine_->state().slipped; }),
       trace_(std::make_shared<RiseWatch>(namesOf(configs_))),
-      rig_(rigOf(configs_, schedule), trace_, test::Bench::couplings(configs_),
+      rig_(rigOf(configs_, schedule_), trace_, test::Bench::couplings(configs_),
            test::Bench::motorPowerOf(optionsOf(schedule.variant)),
            test::Bench::ioOf(optionsOf(schedule.variant))),
       backend_(rig_, [this] { return clock_.now(); }),
@@ -377,7 +442,7 @@ Participants::Participants(const Schedule& schedule)
   axis::LineNames names;
   for (const gpio::OutputRequest& output : wiring_.outputs) names.outputs.push_back(output.line);
   for (const gpio::InputRequest& input : wiring_.inputs) names.inputs.push_back(input.line);
-  if (const auto& ahead = schedule.ahead) {
+  if (const auto& ahead = schedule_.ahead) {
     const auto late = [by = ahead->late](const pulse::StepPort::Step&) { return by; };
     port_ = std::make_unique<test::AheadPort>(
         *lines_, clock_, pulse::PulseEngine::lanesOf(wiring_.channels, wiring_.shared),
@@ -385,7 +450,7 @@ Participants::Participants(const Schedule& schedule)
     engine_ =
         std::make_unique<pulse::PulseEngine>(*port_, *lines_, clock_, wiring_.channels,
                                              kMaxLateness, wiring_.emergency_stop, wiring_.shared);
-    oracle_.takesBack(takingBack(schedule));
+    oracle_.takesBack(takingBack(schedule_));
   } else {
     engine_ = std::make_unique<pulse::PulseEngine>(*lines_, clock_, wiring_.channels, kMaxLateness,
                                                    wiring_.emergency_stop, wiring_.shared);
@@ -403,6 +468,9 @@ Participants::Participants(const Schedule& schedule)
   news_ = std::make_unique<News>(*core_);
   engine_->listen(*news_);
   watched_ = readInputs();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    if (hasPhases(configs_[axis])) trace_->hasPhases(axis);
+  }
   if (hasRegisters(configs_)) {
     trace_->setMicrosteps(0, configs_[0].microsteps);
     const config::TmcConfig& tmc = *configs_[0].tmc;
@@ -418,6 +486,8 @@ Participants::Participants(const Schedule& schedule)
     lowest_limits_[axis].jerk = configs_[axis].jerk;
   }
   trace_->rose = [this](std::size_t axis, std::int64_t time) {
+    // Coils that are switched off beside one that can't be written may look like a step.
+    if (hasPhases(configs_[axis]) && steps_failed_[axis]) return;
     oracle_.rose(axis, time);
     checkPowered(axis, time);
     passes(axis);
@@ -642,6 +712,7 @@ bool Participants::step() {
 
 void Participants::go(Who who) {
   act(who);
+  trace_->settle();
   answerEmergencyStops();
   constexpr std::size_t kCheckedOnceIn = 101;
   if (steps_ % kCheckedOnceIn == 0) checkLive();
@@ -1864,7 +1935,11 @@ void Participants::failSteps(std::size_t axis) {
 }
 
 void Participants::failTurns(std::size_t axis) {
-  rig_.failWrites(configs_[axis].pins.dir.line, 0, EIO);
+  const config::Pins& pins = configs_[axis].pins;
+  // The coils of a motor are its steps and its current too.
+  steps_failed_[axis] = steps_failed_[axis] || hasPhases(configs_[axis]);
+  pins_failed_ = pins_failed_ || hasPhases(configs_[axis]);
+  rig_.failWrites(hasPhases(configs_[axis]) ? pins.in2.line : pins.dir.line, 0, EIO);
 }
 
 void Participants::failSwitch(std::size_t axis) {
@@ -1891,8 +1966,12 @@ void Participants::mendLines() {
   if (had_trouble_) rig_.setTrouble(configs_[0].name, {});
   if (std::exchange(is_silent_, false)) rig_.powerChip(configs_[0].name, true);
   for (const config::AxisConfig& config : configs_) {
-    rig_.clearWriteFault(config.pins.step.line);
-    rig_.clearWriteFault(config.pins.dir.line);
+    if (hasPhases(config)) {
+      rig_.clearWriteFault(config.pins.in2.line);
+    } else {
+      rig_.clearWriteFault(config.pins.step.line);
+      rig_.clearWriteFault(config.pins.dir.line);
+    }
   }
 }
 
@@ -1982,6 +2061,18 @@ void Participants::checkCounts(const std::string& when) {
 sim::RigAxisReport Participants::reportOf(const std::string& rig_axis) const {
   sim::RigAxisReport report = rig_.report(rig_axis);
   if (power_was_lost_) report.violations.erase(sim::Violation::kStepWithoutPower);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    if (rig_axis != configs_[axis].name || !hasPhases(configs_[axis]) || !steps_failed_[axis]) {
+      continue;
+    }
+    // See trace_->rose.
+    for (const sim::Violation known :
+         {sim::Violation::kStepAfterEnable, sim::Violation::kPatternJump,
+          sim::Violation::kAboveTopRate, sim::Violation::kAboveAcceleration}) {
+      report.violations.erase(known);
+    }
+    report.beyond_limits.clear();
+  }
   if (had_trouble_ && rig_axis == configs_[0].name) {
     // Without its registers, a chip makes other steps, or none, from any moment on.
     for (const sim::Violation known :
@@ -2181,7 +2272,17 @@ void Participants::probe() {
     recovered = ask("recover", machine::Recover{}, recovers);
   }
   if (recovered.failure) oracle_.complain("recover: " + recovered.failure->text);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) leaveSharedSwitch(axis);
   for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) probeAxis(axis);
+}
+
+// Somebody does what the refusals of an axis say whose ends share a switch.
+void Participants::leaveSharedSwitch(std::size_t axis) {
+  const sim::RigAxisReport seen = rig_.report(configs_[axis].name);
+  const bool is_pressed = seen.min_pressed || seen.max_pressed;
+  if (configs_[axis].switch_release == 0.0 || !is_pressed) return;
+  ask("disable", machine::Enable{{axis}, false}, {});
+  rig_.placeCarriage(configs_[axis].name, 0.0, clock_.now());
 }
 
 void Participants::probeAxis(std::size_t axis) {
@@ -2199,7 +2300,7 @@ void Participants::probeAxis(std::size_t axis) {
   must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
   // At its block it may have lost steps, and count itself anywhere.
-  if (configs_[axis].tmc) must("set position", machine::SetPosition{axis, 0.0});
+  if (meetsBlock(configs_[axis])) must("set position", machine::SetPosition{axis, 0.0});
   const double way = before > 3.0 ? -0.002 : 0.002;
   const std::size_t moves = moves_.size();
   must("move", machine::MoveTo{axis, way, true, 0.0}, true);

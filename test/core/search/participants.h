@@ -69,9 +69,12 @@ struct Item {
 };
 
 /// Machines that a schedule can be played on.
-constexpr std::size_t kVariants = 6;
+constexpr std::size_t kVariants = 7;
+/// In this one x is homed against a block that an input reports, y has a motor of phases, and the
+/// switches of z's ends and y's min switch share a line.
+constexpr int kPhases = 5;
 /// In this one the driver of x has registers on a UART, and is homed by its stall.
-constexpr int kRegisters = 5;
+constexpr int kRegisters = 6;
 /// The axes of one of them, as it is configured by default.
 std::vector<config::AxisConfig> configsOf(int variant);
 
@@ -369,6 +372,7 @@ class Participants : private machine::ShellCore::Host {
   void checkInPosition();
   void probe();
   void probeAxis(std::size_t axis);
+  void leaveSharedSwitch(std::size_t axis);
   void judgeDone();
 
   const Schedule schedule_;

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stepdriver_core/driver/driver_chip.h"
@@ -31,8 +34,8 @@ class EdgeHash {
   std::uint64_t values_ = 0;
 };
 
-/// Reports each rising STEP edge of the rig, with the number of its axis, and counts them. The
-/// chips are A4988s, or have registers.
+/// Reports each step of the rig, with the number of its axis, and counts them: a rising edge of
+/// STEP, or another pattern of coils. The chips are A4988s, or have registers, or switch coils.
 class RiseWatch : public sim::PinTrace {
  public:
   explicit RiseWatch(std::vector<std::string> axes) : axes_(std::move(axes)) {
@@ -42,10 +45,22 @@ class RiseWatch : public sim::PinTrace {
   std::function<void(std::size_t axis, std::int64_t time_ns)> rose;
   EdgeHash* hash = nullptr;  ///< is given all edges
 
-  /// [1/16 steps] Where the pulses have taken the motor of an axis.
+  /// [1/16 steps, half steps of coils] Where the pulses have taken the motor of an axis.
   std::int64_t place(std::size_t axis) const { return motors_.at(axis).place; }
   /// The mode of a chip with registers.
   void setMicrosteps(std::size_t axis, int microsteps) { motors_.at(axis).step = 16 / microsteps; }
+
+  /// The axis has a motor of phases, in half steps.
+  void hasPhases(std::size_t axis) {
+    motors_.at(axis).has_phases = true;
+    motors_.at(axis).pattern = patternOf(motors_.at(axis).coils);
+  }
+  /// A write is over. What it has done to coils counts as one.
+  void settle() {
+    for (std::size_t axis = 0; axis < motors_.size(); ++axis) {
+      if (motors_[axis].is_switching) settle(axis);
+    }
+  }
 
   void begin(const std::vector<sim::TracePin>& pins, const std::vector<bool>& levels,
              std::int64_t /*time_ns*/) override {
@@ -66,6 +81,7 @@ class RiseWatch : public sim::PinTrace {
     }
     const Pin& changed = pins_[static_cast<std::size_t>(pin)];
     if (changed.role == Role::kOther) return;
+    if (changed.role >= Role::kIn1) return switchCoil(changed, level, time_ns);
     if (changed.role != Role::kStep) return set(changed, level);
     if (!level) return;
     Motor& motor = motors_[changed.axis];
@@ -74,7 +90,7 @@ class RiseWatch : public sim::PinTrace {
   }
 
  private:
-  enum class Role { kOther, kStep, kDir, kMs1, kMs2, kMs3 };
+  enum class Role { kOther, kStep, kDir, kMs1, kMs2, kMs3, kIn1, kIn2, kIn3, kIn4 };
   struct Pin {
     std::size_t axis = 0;
     Role role = Role::kOther;
@@ -85,6 +101,11 @@ class RiseWatch : public sim::PinTrace {
     driver::ModeCode code{};
     std::int64_t step = 16;
     std::int64_t place = 0;
+    bool has_phases = false;
+    std::array<bool, 4> coils{};
+    std::optional<int> pattern;  // the last one that a step has; empty: none so far
+    bool is_switching = false;
+    std::int64_t switched_ns = 0;
   };
 
   static Role roleOf(const std::string& variable) {
@@ -92,13 +113,56 @@ class RiseWatch : public sim::PinTrace {
     if (variable == "dir") return Role::kDir;
     if (variable == "ms1") return Role::kMs1;
     if (variable == "ms2") return Role::kMs2;
-    return variable == "ms3" ? Role::kMs3 : Role::kOther;
+    if (variable == "ms3") return Role::kMs3;
+    if (variable == "in1") return Role::kIn1;
+    if (variable == "in2") return Role::kIn2;
+    if (variable == "in3") return Role::kIn3;
+    return variable == "in4" ? Role::kIn4 : Role::kOther;
+  }
+
+  // The half steps of a cycle; a coil is on in three of them.
+  static std::optional<int> patternOf(const std::array<bool, 4>& coils) {
+    static constexpr std::array<std::array<bool, 4>, 8> kPatterns = {{{true, true, false, false},
+                                                                      {false, true, false, false},
+                                                                      {false, true, true, false},
+                                                                      {false, false, true, false},
+                                                                      {false, false, true, true},
+                                                                      {false, false, false, true},
+                                                                      {true, false, false, true},
+                                                                      {true, false, false, false}}};
+    const auto* found = std::find(kPatterns.begin(), kPatterns.end(), coils);
+    if (found == kPatterns.end()) return {};
+    return static_cast<int>(found - kPatterns.begin());
+  }
+
+  void switchCoil(const Pin& pin, bool level, std::int64_t time_ns) {
+    Motor& motor = motors_[pin.axis];
+    if (motor.is_switching && time_ns > motor.switched_ns) settle(pin.axis);
+    set(pin, level);
+    motor.is_switching = true;
+    motor.switched_ns = time_ns;
+  }
+
+  void settle(std::size_t axis) {
+    Motor& motor = motors_[axis];
+    motor.is_switching = false;
+    const std::optional<int> now = patternOf(motor.coils);
+    if (!now || !motor.has_phases) return;
+    const int before = std::exchange(motor.pattern, now).value_or(*now);
+    const int way = (*now - before + 12) % 8 - 4;
+    motor.place += way;
+    if (way != 0 && rose) rose(axis, motor.switched_ns);
   }
 
   void set(const Pin& pin, bool level) {
     Motor& motor = motors_[pin.axis];
     if (pin.role == Role::kDir) motor.dir = level;
     if (pin.role < Role::kMs1) return;
+    if (pin.role >= Role::kIn1) {
+      motor.coils.at(static_cast<std::size_t>(pin.role) - static_cast<std::size_t>(Role::kIn1)) =
+          level;
+      return;
+    }
     motor.code.at(static_cast<std::size_t>(pin.role) - static_cast<std::size_t>(Role::kMs1)) =
         level;
     static const driver::DriverChip& chip = driver::driverChip("a4988");
