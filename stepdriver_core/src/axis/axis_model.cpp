@@ -532,6 +532,8 @@ void AxisModel::noteReset() {
 
 void AxisModel::noteSupplyLost() {
   motor.forgetRegisters();
+  // The pattern of coils that lines switch is no chip's.
+  if (motor.hasCoils()) return noteUnpowered();
   for (std::size_t i = 0; i < config.motors(); ++i) noteHome(i);
 }
 

@@ -338,6 +338,7 @@ void ChipModel::goHomeIfHeld() {
 }
 
 void ChipModel::powerUp() {
+  if (chip_.step_inputs == driver::StepInputs::kPhases) return;  // its lines are the pattern
   translator_ = cycle() * floorDivide(translator_ + cycle() / 2, cycle());
 }
 

@@ -132,6 +132,29 @@ TEST(Phases, GoOffAtAnEmergencyStopThatDisables) {
   EXPECT_EQ(violationsOf(bench.report()), "");
 }
 
+TEST(Phases, ContinueTheirPatternWhenTheMotorPowerComesBack) {
+  config::AxisConfig config = coilAxis();
+  config.holds_position_unpowered = true;
+  machine::MachineOptions options;
+  options.motor_power = config::MotorPowerConfig{};
+  options.motor_power->line = "power";
+  Bench bench({config}, Bench::rigAxes({config}), false, 0.0, options);
+  bench.axis().setPosition(0.0);
+  bench.move(stepsTo(config, 3));
+  EXPECT_EQ(coilsOf(bench), "0010");
+  bench.machine->emergencyStop();
+  bench.machine->advance(10.0);
+  ASSERT_EQ(bench.rig.outputLevel("power"), false);
+  bench.machine->recover();
+  bench.axis().enable(true);
+  EXPECT_EQ(coilsOf(bench), "0010");
+  EXPECT_TRUE(bench.axis().state().position_valid);
+  EXPECT_EQ(bench.move(stepsTo(config, 4)).end, MoveEnd::kReached);
+  EXPECT_NEAR(bench.report().carriage, bench.axis().state().position * 1000.0, 1e-6);
+  EXPECT_EQ(bench.report().pulses_forward, 4);
+  EXPECT_EQ(violationsOf(bench.report()), "");
+}
+
 TEST(Phases, NameTheLineThatFailsAndRecover) {
   const config::AxisConfig config = coilAxis();
   Bench bench({config});

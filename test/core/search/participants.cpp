@@ -262,7 +262,7 @@ machine::MachineOptions optionsOf(int variant) {
   machine::MachineOptions options;
   options.emergency_stop = config::InputSwitch{kEmergencyStop, true};
   options.emergency_disable = emergencyDisableOf(variant);
-  if (variant == 1) {
+  if (variant == 1 || variant == kPhases) {
     options.motor_power = config::MotorPowerConfig{};
     options.motor_power->line = "power";
     options.motor_power->on_ns = 15 * kMillisecond;

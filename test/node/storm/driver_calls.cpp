@@ -416,8 +416,7 @@ bool DriverCalls::home(std::size_t axis, bool wait) {
 bool DriverCalls::homeAll(bool wait) {
   HomeAxes service;
   service.request.wait = wait;
-  // Only x has a homing.
-  return call(requestOf(Kind::kHoming, 1U, "home", wait), "home", service);
+  return call(requestOf(Kind::kHoming, kAllAxes, "home", wait), "home", service);
 }
 
 bool DriverCalls::microstep(std::size_t axis, int microsteps) {

@@ -32,7 +32,7 @@ class DriverTopics {
   void cancelTrajectories();
   void moveByAction(int client, std::size_t axis, double position, bool relative);
   void cancelMove(std::size_t axis);
-  /// Positions at the edges of the input kInput.
+  /// Positions of the axes, x first, at the edges of the input kInput.
   void latch(int client, bool every);
   void cancelLatches();
 

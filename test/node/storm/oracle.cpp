@@ -113,6 +113,7 @@ class Judge {
       }
     }
     judgePositions();
+    for (const Latched& latched : seen_.latched) judgeLatched(latched);
     for (std::size_t i = 1; i < seen_.rests.size(); ++i) {
       for (std::size_t axis = 0; axis < seen_.axes.size(); ++axis) {
         judgeWay(axis, seen_.rests[i - 1], seen_.rests[i]);
@@ -371,9 +372,14 @@ class Judge {
   }
 
   std::int64_t countAt(std::size_t axis, std::int64_t time) const {
+    return countShown(axis, clock_.latestAt(time));
+  }
+
+  /// When the rig's clock shows this.
+  std::int64_t countShown(std::size_t axis, std::int64_t rig) const {
     const auto& pulses = seen_.pulses[axis];
     const auto after =
-        std::upper_bound(pulses.begin(), pulses.end(), clock_.latestAt(time),
+        std::upper_bound(pulses.begin(), pulses.end(), rig,
                          [](std::int64_t t, const Pulse& pulse) { return t < pulse.time; });
     return after == pulses.begin() ? 0 : std::prev(after)->count;
   }
@@ -401,6 +407,32 @@ class Judge {
         anchor = &rest;
       }
     }
+  }
+
+  // The edge may be any of those since the last rest; a message is under way for less than a
+  // second.
+  void judgeLatched(const Latched& latched) {
+    constexpr std::int64_t kUnderWay = 1000 * kMillisecond;
+    const auto rest = std::find_if(
+        seen_.rests.rbegin(), seen_.rests.rend(),
+        [&](const RestPoint& point) { return point.time < latched.received - kUnderWay; });
+    if (rest == seen_.rests.rend() || mayBeRenamed(0, rest->time, latched.received)) return;
+    const AxisFacts& facts = seen_.axes.front();
+    const double told = (latched.position - rest->positions.front()) * facts.steps_per_metre;
+    const std::int64_t begin = clock_.earliestAt(rest->time) - kUnderWay;
+    const std::int64_t end = clock_.latestAt(latched.received);
+    const bool is_there =
+        std::any_of(seen_.input.begin(), seen_.input.end(), [&](const Switch& edge) {
+          if (edge.on != latched.active || edge.time < begin || edge.time > end) return false;
+          const auto counted =
+              static_cast<double>(countShown(0, edge.time) - countAt(0, rest->time));
+          return std::abs(told - counted) <= kWayError + facts.backlash * facts.steps_per_metre;
+        });
+    if (is_there) return;
+    broken_.push_back(facts.name + ": a latch tells of an edge at " +
+                      formatted("%.5f m", latched.position) +
+                      ", where the input has none; requests:" +
+                      requestsAround(latched.received, latched.received));
   }
 
   struct Way {

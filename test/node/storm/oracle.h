@@ -13,7 +13,7 @@ namespace stepdriver::storm {
 struct AxisFacts {
   std::string name;
   double longest_stop = 0.0;     ///< [s] from its maximum speed and its maximum acceleration
-  double steps_per_metre = 0.0;  ///< in 1/16 steps
+  double steps_per_metre = 0.0;  ///< in 1/16 steps, or half steps of a motor of phases
   double backlash = 0.0;         ///< [m]
   double min_position = 0.0;     ///< [m] its soft limits
   double max_position = 0.0;     ///< [m]
@@ -22,13 +22,20 @@ struct AxisFacts {
 /// A pulse that the rig saw.
 struct Pulse {
   std::int64_t time = 0;   ///< [ns] on the rig's clock
-  std::int64_t count = 0;  ///< [1/16 steps] forward less backward, with this pulse
+  std::int64_t count = 0;  ///< forward less backward, with this pulse, in the steps of AxisFacts
 };
 
-/// A change of an output.
+/// A change of an output or an input.
 struct Switch {
   std::int64_t time = 0;  ///< [ns] on the rig's clock
   bool on = false;
+};
+
+/// An edge of the input that the first axis presses, as a latch tells it.
+struct Latched {
+  std::int64_t received = 0;  ///< [ns] of CLOCK_MONOTONIC
+  bool active = false;
+  double position = 0.0;  ///< [m] of the first axis
 };
 
 /// A moment at which every axis was at rest, and what the node said then.
@@ -49,6 +56,8 @@ struct Observation {
   std::vector<Request> requests;
   std::vector<std::vector<Pulse>> pulses;     ///< those of each axis
   std::vector<std::vector<Switch>> switches;  ///< of each output, from off on, in their order
+  std::vector<Switch> input;                  ///< changes of the input of the latches
+  std::vector<Latched> latched;
   std::vector<RestPoint> rests;
   std::vector<Stall> stalls;
   std::vector<ClockReading> clock;  ///< what the rig's clock showed
@@ -63,7 +72,8 @@ struct Observation {
 /// - From the answer of an emergency stop until a newer recover can have come, all outputs are off.
 /// - If an answer says that an output was switched, it was so between the request and the answer.
 /// - If an answer says that a position was reached, it was reached.
-/// - The reported position is the count of the pulses.
+/// - The reported position is the count of the pulses. So is a latched one, at an edge of the
+/// input.
 /// - Pulses never lead an axis beyond its soft limits. If only one request for motion comes between
 ///   two moments of rest, they never leave the way that this request describes.
 ///

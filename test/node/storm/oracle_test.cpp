@@ -73,6 +73,11 @@ class OneAxis {
     }
   }
   void switchOutput(std::int64_t time, bool on) { seen_.switches[0].push_back({time * kMs, on}); }
+  /// The input changes, and a latch tells it 20 ms later.
+  void latch(std::int64_t time, bool active, double told) {
+    seen_.input.push_back({time * kMs, active});
+    seen_.latched.push_back({(time + kOffset + 20) * kMs, active, told});
+  }
   std::size_t broken() const { return brokenPromises(seen_).size(); }
 
  private:
@@ -99,6 +104,17 @@ TEST(Oracle, LetsNoPulseFollowADisableOrAnEmergencyStop) {
   for (const Kind kind : {Kind::kDisable, Kind::kSleep, Kind::kEmergencyStop}) {
     EXPECT_EQ(endedBy(kind, 2010).broken(), 0U);
     EXPECT_EQ(endedBy(kind, 2015).broken(), 1U);
+  }
+}
+
+TEST(Oracle, FindsLatchedPositionsAtEdgesOfTheInput) {
+  for (const std::int64_t beside : {0, 10}) {
+    OneAxis axis;
+    axis.rest(1500, 0.0);
+    axis.ask(requestOf(Kind::kMotion, 2000, 2005));
+    axis.move(1005, 3005);
+    axis.latch(2004, true, static_cast<double>(1000 + beside) / kStepsPerMetre);
+    EXPECT_EQ(axis.broken(), beside == 0 ? 0U : 1U);
   }
 }
 

@@ -1,6 +1,9 @@
 #include "storm/pulses.h"
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <set>
 #include <stdexcept>
 
 namespace stepdriver::storm {
@@ -60,9 +63,51 @@ class StepSize {
   std::vector<Level> pins_;
 };
 
+// The half steps of a cycle.
+constexpr std::array<std::array<bool, 4>, 8> kPatterns = {{{true, true, false, false},
+                                                           {false, true, false, false},
+                                                           {false, true, true, false},
+                                                           {false, false, true, false},
+                                                           {false, false, true, true},
+                                                           {false, false, false, true},
+                                                           {true, false, false, true},
+                                                           {true, false, false, false}}};
+
+// A write switches several coils within this time; steps are farther apart.
+constexpr std::int64_t kOneWrite = 100'000;  // [ns]
+
+// What a write has done counts as one. Coils that go off together keep the motor's place.
+std::vector<Pulse> pulsesOfCoils(const Trace& trace, const std::string& axis) {
+  std::vector<Level> coils;
+  std::set<std::int64_t> times;
+  for (const char* coil : {"/in1", "/in2", "/in3", "/in4"}) {
+    const node_test::Waveform& waveform = trace.at(axis + coil);
+    coils.emplace_back(waveform);
+    for (const auto& edge : waveform.edges) times.insert(edge.time_ns);
+  }
+  std::vector<Pulse> pulses;
+  std::int64_t count = 0;
+  int number = 0;  // of the last pattern
+  for (auto next = times.begin(); next != times.end();) {
+    const std::int64_t time = *next++;
+    if (next != times.end() && *next - time < kOneWrite) continue;
+    std::array<bool, 4> now{};
+    for (std::size_t i = 0; i < now.size(); ++i) now.at(i) = coils[i].at(time);
+    const auto* found = std::find(kPatterns.begin(), kPatterns.end(), now);
+    if (found == kPatterns.end()) continue;
+    const int way = (static_cast<int>(found - kPatterns.begin()) - number + 12) % 8 - 4;
+    number = static_cast<int>(found - kPatterns.begin());
+    if (way == 0) continue;
+    count += way;
+    pulses.push_back({time, count});
+  }
+  return pulses;
+}
+
 }  // namespace
 
 std::vector<Pulse> pulsesOf(const Trace& trace, const std::string& axis) {
+  if (trace.count(axis + "/in1") != 0) return pulsesOfCoils(trace, axis);
   Level dir(trace.at(axis + "/dir"));
   StepSize step_size(trace, axis);
   std::vector<Pulse> pulses;

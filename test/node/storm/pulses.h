@@ -9,7 +9,8 @@
 
 namespace stepdriver::storm {
 
-/// The pulses of an A4988 with microstep pins, from its trace.
+/// The pulses of an A4988 with microstep pins, of a driver with registers, or of a motor of phases,
+/// from its trace.
 std::vector<Pulse> pulsesOf(const std::map<std::string, node_test::Waveform>& trace,
                             const std::string& axis);
 

@@ -6,7 +6,6 @@
 #include <numeric>
 #include <thread>
 
-#include "storm/storm_machine.h"
 #include "support/wait.h"
 
 namespace stepdriver::storm {
@@ -25,9 +24,11 @@ constexpr double kFarthest = 0.012;  // [m] of a relative move
 
 }  // namespace
 
-StormClient::StormClient(const std::string& node, int number, std::uint64_t seed,
-                         DriverTopics& topics, RequestLog& log, const std::atomic<Weather>& weather)
-    : number_(number),
+StormClient::StormClient(const std::string& node, StormMachine machine, int number,
+                         std::uint64_t seed, DriverTopics& topics, RequestLog& log,
+                         const std::atomic<Weather>& weather)
+    : machine_(machine),
+      number_(number),
       random_(seed * 1000 + static_cast<std::uint64_t>(number)),
       calls_(node, number, log),
       topics_(topics),
@@ -115,7 +116,7 @@ void StormClient::sendMotion() {
       [&] {
         // A homing takes a long time.
         if (!chance(0.2)) return;
-        chance(0.5) ? calls_.home(0, wait) : calls_.homeAll(wait);
+        chance(0.7) ? calls_.home(axis, wait) : calls_.homeAll(wait);
       },
   };
   motions[std::uniform_int_distribution<std::size_t>(0, motions.size() - 1)(random_)]();
@@ -126,16 +127,16 @@ void StormClient::sendSetting() {
   const double what = between(0.0, 1.0);
   if (what < 0.25) {
     calls_.speedOverride(chance(0.3) ? 1.0 : between(0.2, 2.0));
-  } else if (what < 0.55) {
+  } else if (what < 0.45) {
     const auto or_configured = [&](double low, double high) {
       return chance(0.4) ? 0.0 : between(low, high);
     };
     calls_.setLimits(axis, or_configured(0.01, 0.04), or_configured(0.02, 0.2),
                      or_configured(0.05, 3.0));
-  } else if (what < 0.58) {
+  } else if (what < 0.5) {
     const double from = anyPosition();
     calls_.compare(axis, from, from + between(0.001, 0.02));
-  } else if (what < 0.66) {
+  } else if (what < 0.6) {
     const std::size_t last = kOutputs.size() - 1;
     calls_.setOutput(std::uniform_int_distribution<std::size_t>(0, last)(random_), chance(0.6));
   } else if (what < 0.73) {
@@ -146,7 +147,11 @@ void StormClient::sendSetting() {
     const double run = between(0.2, kHighestCurrent);
     calls_.setCurrent(kWithRegisters, run, between(0.1, run));
   } else if (what < 0.9) {
-    calls_.microstep(chance(0.5) ? 0 : 2, chance(0.5) ? 16 : 8);
+    if (chance(0.5)) {
+      calls_.microstep(0, chance(0.5) ? 16 : 8);
+    } else {
+      calls_.microstep(2, microstepsOfZ(machine_).at(chance(0.5) ? 0 : 1));
+    }
   } else {
     pressSwitch();
   }
@@ -226,7 +231,8 @@ void StormClient::streamSetpoints() {
 }
 
 void StormClient::pressSwitch() {
-  const std::string service = chance(0.5) ? "rig/x/press_min" : "rig/x/press_max";
+  const std::vector<std::string> services = switchesOf(machine_);
+  const std::string& service = services.at(chance(0.5) ? 0 : services.size() - 1);
   calls_.set(Kind::kOther, 0, service, true);
   pause(kLongestPause);
   calls_.set(Kind::kOther, 0, service, false);

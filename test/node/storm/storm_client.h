@@ -9,6 +9,7 @@
 
 #include "storm/driver_calls.h"
 #include "storm/request_log.h"
+#include "storm/storm_machine.h"
 
 namespace stepdriver::storm {
 
@@ -23,8 +24,8 @@ enum class Weather {
 /// same requests, but their effects depend on the other clients and on the computer.
 class StormClient {
  public:
-  StormClient(const std::string& node, int number, std::uint64_t seed, DriverTopics& topics,
-              RequestLog& log, const std::atomic<Weather>& weather);
+  StormClient(const std::string& node, StormMachine machine, int number, std::uint64_t seed,
+              DriverTopics& topics, RequestLog& log, const std::atomic<Weather>& weather);
 
   /// Sends requests until the storm is over.
   void run();
@@ -50,6 +51,7 @@ class StormClient {
   double anyPosition();
   void pause(double longest);
 
+  const StormMachine machine_;
   const int number_;
   std::mt19937_64 random_;
   DriverCalls calls_;

@@ -98,19 +98,19 @@ class Storm : public testing::Test {
   Storm() : seed_(static_cast<std::uint64_t>(ros::param::param("~seed", 1))), random_(seed_) {}
 
   void SetUp() override {
-    seen_.axes = setUpMachine(node_);
+    seen_.axes = setUpMachine(node_, machineOf(seed_));
     trace_ = node_.traced();
     node_.start();
     topics_.emplace(node_.name(), log_);
     states_.emplace(node_.full("axis_states"));
     latched_positions_ = ros::NodeHandle().subscribe<LatchedPositions>(
         node_.full("latched_positions"), 100,
-        [this](const LatchedPositions::ConstPtr& /*edge*/) { ++latched_; });
+        [this](const LatchedPositions::ConstPtr& edge) { noteLatched(*edge); });
     clock_watch_.emplace(node_.full("rig/report"));
     ender_.emplace(node_.name(), kClients, log_);
     ASSERT_TRUE(waitUntil([&] { return topics_->connected() && states_->count() > 0; }));
     for (int i = 0; i < kClients; ++i) {
-      clients_.emplace_back(node_.name(), i, seed_, *topics_, log_, weather_);
+      clients_.emplace_back(node_.name(), machineOf(seed_), i, seed_, *topics_, log_, weather_);
     }
     for (StormClient& client : clients_) threads_.emplace_back([&client] { client.run(); });
   }
@@ -135,6 +135,7 @@ class Storm : public testing::Test {
   void stopAll();
   void repair();
   void noteRest();
+  void noteLatched(const LatchedPositions& edge);
   /// One motion from rest to rest, of which the oracle knows the whole way; often a slow one.
   void moveAlone();
   void end();
@@ -164,7 +165,7 @@ class Storm : public testing::Test {
   std::atomic<Weather> weather_{Weather::kCalm};
   std::deque<StormClient> clients_;
   std::deque<std::thread> threads_;
-  std::atomic<std::uint64_t> latched_{0};
+  std::mutex latched_mutex_;  // for seen_.latched
   ros::Subscriber latched_positions_;
   std::vector<double> memory_;  // [MB] of the node at each calm
   Observation seen_;
@@ -255,6 +256,13 @@ void Storm::noteRest() {
   memory_.push_back(static_cast<double>(node_.process().kilobytes("VmRSS")) / 1024.0);
 }
 
+void Storm::noteLatched(const LatchedPositions& edge) {
+  const std::int64_t now = steadyNow();
+  if (edge.position_valid.front() == 0) return;
+  const std::lock_guard<std::mutex> lock(latched_mutex_);
+  seen_.latched.push_back({now, edge.active != 0, edge.position.front()});
+}
+
 void Storm::moveAlone() {
   const std::vector<std::size_t> axes{chance(0.5) ? std::size_t{0} : std::size_t{1}, 2};
   const double velocity = std::pow(10.0, between(-4.0, -1.7));
@@ -297,16 +305,22 @@ void Storm::judge() {
     }
     switches += changes.size();
   }
+  bool pressed = false;
+  for (const auto& edge : trace.at(std::string("inputs/") + kInput).edges) {
+    if (std::exchange(pressed, edge.level) != edge.level) {
+      seen_.input.push_back({edge.time_ns, pressed});
+    }
+  }
   seen_.requests = log_.requests();
   seen_.stalls = stall_watch_.stalls();
   std::size_t pulses = 0;
   for (const auto& each : seen_.pulses) pulses += each.size();
   std::printf(
-      "storm: seed %llu, %zu requests, %zu pulses, %zu switches, %llu latched edges, %zu calms, "
+      "storm: seed %llu, %zu requests, %zu pulses, %zu switches, %zu latched edges, %zu calms, "
       "%zu stalls, %zu readings of the rig's clock, %.1f to %.1f MB\n",
       static_cast<unsigned long long>(seed_), seen_.requests.size(), pulses, switches,
-      static_cast<unsigned long long>(latched_.load()), seen_.rests.size(), seen_.stalls.size(),
-      seen_.clock.size(), *std::min_element(memory_.begin(), memory_.end()),
+      seen_.latched.size(), seen_.rests.size(), seen_.stalls.size(), seen_.clock.size(),
+      *std::min_element(memory_.begin(), memory_.end()),
       *std::max_element(memory_.begin(), memory_.end()));
   const auto broken = brokenPromises(seen_);
   for (std::size_t i = 0; i < std::min(broken.size(), kMostReported); ++i) fail(broken[i]);

@@ -295,7 +295,7 @@ struct RigFaults {
 /// to another pattern. While a brake is engaged the rotor doesn't
 /// turn; when it is released, the rotor snaps as above. A load turns the rotor back while neither
 /// current nor the brake holds it. Without motor power no current flows in any axis; when the power
-/// comes, each chip begins with its translator at the nearest Home.
+/// comes, each chip with a translator begins with it at the nearest Home.
 ///
 /// Lines. Before its first request a line has the level of a pull resistor towards the safe side:
 /// disabled, asleep, in RESET, everything else inactive or low. The first request makes no edge:
