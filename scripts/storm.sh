@@ -11,7 +11,7 @@ usage: scripts/storm.sh [--minutes MINUTES] [--seed SEED]
 Installs missing packages, builds the package, and lets four clients send random requests of every kind
 (moves, lines, trajectories, jogs, homings, stops, holds, disables, emergency stops, settings) to a node
 with three axes on the simulated rig, for MINUTES (default: 5), from SEED (default: a new one each time,
-which is printed). Then the oracle (test/node/storm/oracle.h) compares the rig's pin trace with the
+which is printed; even ones have another machine than odd ones). Then the oracle (test/node/storm/oracle.h) compares the rig's pin trace with the
 answers. It prints each broken promise with the requests around it. Exit code 0: every promise was kept.
 END
 }

@@ -134,7 +134,8 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node, StormMachine
   node.set("motor_power/feedback/pin", "motor_power_feedback");
   node.set("motor_power/feedback/active_level", "high");
   for (const std::string& output : kOutputs) node.set("outputs/" + output + "/pin", output);
-  setUpInput(node, kInput, "x", 10.0, 20.0);
+  setUpInput(node, kInput, "x", 4.0, 6.0);
+  node.set(std::string("simulation/inputs/") + kInput + "/every_mm", 10.0);
   const std::initializer_list<const char*> pins = {"step", "dir",   "ms1",  "ms2",
                                                    "ms3",  "sleep", "reset"};
   std::vector<AxisFacts> facts;

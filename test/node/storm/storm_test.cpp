@@ -258,7 +258,6 @@ void Storm::noteRest() {
 
 void Storm::noteLatched(const LatchedPositions& edge) {
   const std::int64_t now = steadyNow();
-  if (edge.position_valid.front() == 0) return;
   const std::lock_guard<std::mutex> lock(latched_mutex_);
   seen_.latched.push_back({now, edge.active != 0, edge.position.front()});
 }
@@ -306,7 +305,7 @@ void Storm::judge() {
     switches += changes.size();
   }
   bool pressed = false;
-  for (const auto& edge : trace.at(std::string("inputs/") + kInput).edges) {
+  for (const auto& edge : trace.at("x/flag1").edges) {
     if (std::exchange(pressed, edge.level) != edge.level) {
       seen_.input.push_back({edge.time_ns, pressed});
     }
