@@ -806,6 +806,13 @@ axis::MoveResult MotionExecution::resultOf(const Order& order) const {
   auto [end, why] = endOf(*order.axis, order.goal, accepted_mode_ != Mode::kRun,
                           {by_fault ? why_.end : axis::MoveEnd::kStopped, why_.text});
   if (end == axis::MoveEnd::kCompanion) why = endedWith(*order.axis);
+  // It is where it was to go, but an output couldn't be written.
+  const axis::Fault& fault = order.axis->fault;
+  const auto& marks = order.goal.marks;
+  if (end == axis::MoveEnd::kReached && marks && marks->notMade() != 0 && fault) {
+    end = fault.isEmergencyStop() ? axis::MoveEnd::kEmergencyStop : axis::MoveEnd::kFault;
+    why = fault.what();
+  }
   return resultWith(context_, *order.axis, order.goal, end, why);
 }
 

@@ -14,6 +14,7 @@ struct OutputLine {
   Nanoseconds min_on = 0;
   Nanoseconds min_off = 0;
   Nanoseconds max_on = kNever;
+  Nanoseconds write_timeout = kNever;  ///< a late write that takes longer counts as failed
 };
 
 /// What the writes of an output have made of it. All times are clock times.
@@ -34,8 +35,9 @@ struct OutputLineState {
   std::uint64_t ended_made = 0;  ///< marks of that one that were made
   std::uint64_t changes = 0;     ///< how often a path has switched it
   WrittenOutput written;         ///< by the last of them
-  bool due = false;              ///< a mark is still to come in the motion as it is ordered
-  bool too_long = false;         ///< the last of them was by OutputLine::max_on
+  /// A mark is still to come in the motion as it is ordered, or a write is still to end.
+  bool due = false;
+  bool too_long = false;  ///< the last of them was by OutputLine::max_on
   /// @name What the position of an axis switches
   /// @{
   std::uint64_t compare = 0;   ///< serial of the order for it that is kept; 0: none
@@ -43,7 +45,8 @@ struct OutputLineState {
   std::uint64_t compared = 0;  ///< actions that were made since the start
   std::uint64_t missed = 0;    ///< those whose place was passed, but which could not be made
   /// @}
-  int error = 0;  ///< errno of a write that has failed, which ended the path's part
+  std::uint64_t failures = 0;  ///< how often a write has failed, which ends the part of a motion
+  int error = 0;               ///< errno of the last of them
 };
 
 }  // namespace stepdriver::pulse

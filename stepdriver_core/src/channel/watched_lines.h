@@ -21,6 +21,8 @@ class WatchedLines {
     input_.store(-1, std::memory_order_relaxed);
     return lines_.write(writes, count);
   }
+  /// See gpio::Lines.
+  gpio::LateWrites lateWrites(int output) const { return lines_.lateWrites(output); }
   /// @return the level or, below 0, an errno.
   int read(int input) {
     input_.store(input, std::memory_order_relaxed);

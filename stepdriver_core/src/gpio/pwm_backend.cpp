@@ -56,23 +56,34 @@ class PwmChip {
   int write(std::size_t number, bool level, std::uint16_t part = LineWrite::kWhole) noexcept {
     Output& output = outputs_[number];
     const std::uint64_t order = output.last_order.fetch_add(1) + 1;
+    if (!this_thread_may_wait) output.late = order;
     // Of two threads that write at once, the one that ordered later counts.
-    const std::uint64_t wanted = order << kSettingBits | (level ? kHigh | part : 0U);
+    const std::uint64_t wanted =
+        order << kSettingBits | (this_thread_may_wait ? 0U : kLate) | (level ? kHigh | part : 0U);
     std::uint64_t before = output.wanted.load();
     while (before < wanted && !output.wanted.compare_exchange_weak(before, wanted)) {
     }
     sem_post(&ordered_);
-    if (this_thread_may_wait) {
-      std::unique_lock<std::mutex> lock(mutex_);
-      made_.wait(lock, [&] { return output.made >= order; });
-    }
-    return output.error.load();
+    if (!this_thread_may_wait) return 0;
+    std::unique_lock<std::mutex> lock(mutex_);
+    made_.wait(lock, [&] { return output.made >= order; });
+    return output.error;
+  }
+
+  LateWrites lateWrites(std::size_t number) const noexcept {
+    const Output& output = outputs_[number];
+    LateWrites writes{output.late, output.made};
+    // In this order, each that has ended is also known to have failed.
+    writes.failed = output.failed;
+    writes.error = output.late_error;
+    return writes;
   }
 
  private:
-  // What is ordered: the part, and whether it is high.
+  // What is ordered: the part, whether it is high, and whether nobody waits for it.
   static constexpr std::uint64_t kHigh = 1U << 16U;
-  static constexpr unsigned kSettingBits = 17;
+  static constexpr std::uint64_t kLate = 1U << 17U;
+  static constexpr unsigned kSettingBits = 18;
 
   struct Output {
     Output(const std::string& folder, const PwmLine& line, bool level)
@@ -81,8 +92,11 @@ class PwmChip {
     const PwmChannel channel;
     std::atomic<std::uint64_t> last_order{0};
     std::atomic<std::uint64_t> wanted{0};  // the number of an order, and behind it what it is
-    std::atomic<int> error{0};             // errno of the last write; 0: it succeeded
-    std::uint64_t made = 0;                // that order is written, or a later one
+    std::atomic<std::uint64_t> made{0};    // that order is written, or a later one
+    std::atomic<std::uint64_t> late{0};    // the last order for which nobody waits
+    std::atomic<std::uint64_t> failed{0};  // the last of those that has failed
+    std::atomic<int> late_error{0};        // errno of that one
+    int error = 0;                         // errno of the last write; 0: it succeeded
   };
 
   void run() {
@@ -92,12 +106,18 @@ class PwmChip {
       std::unique_lock<std::mutex> lock(mutex_);
       for (Output& output : outputs_) {
         const std::uint64_t wanted = output.wanted.load();
-        if (wanted >> kSettingBits == output.made) continue;
+        const std::uint64_t order = wanted >> kSettingBits;
+        if (order == output.made) continue;
         lock.unlock();
-        output.error =
+        const int error =
             output.channel.write((wanted & kHigh) != 0, static_cast<std::uint16_t>(wanted));
         lock.lock();
-        output.made = wanted >> kSettingBits;
+        output.error = error;
+        if (error != 0 && (wanted & kLate) != 0) {
+          output.late_error = error;
+          output.failed = order;
+        }
+        output.made = order;
         made_.notify_all();
       }
     }
@@ -162,6 +182,11 @@ class PwmLines final : public Lines {
       if (error == 0) error = own;
     }
     return error;
+  }
+  LateWrites lateWrites(int number) const noexcept override {
+    const Output& output = outputs_[static_cast<std::size_t>(number)];
+    return output.pwm ? output.chip->lateWrites(output.number)
+                      : base_->lateWrites(static_cast<int>(output.number));
   }
   int read(int input) noexcept override { return base_->read(input); }
   int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,

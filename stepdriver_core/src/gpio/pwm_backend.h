@@ -12,9 +12,9 @@ namespace stepdriver::gpio {
 ///
 /// A request exports the channel, sets its period, and enables it with the length of its safe
 /// level. A thread for each chip writes the lengths, so that a write of the pulse thread never
-/// waits for a file: it returns the error of the last length that was written. A write of any other
-/// thread waits until the length is written. Before release the safe level is written; the channel
-/// stays exported and enabled.
+/// waits for a file: Lines::lateWrites() has its end. A write of any other thread waits until the
+/// length is written. Before release the safe level is written; the channel stays exported and
+/// enabled.
 ///
 /// @param folder with the kernel's PWM chips: /sys/class/pwm.
 std::unique_ptr<Backend> withPwm(std::unique_ptr<Backend> base, std::string folder);

@@ -185,6 +185,8 @@ void Controller::on(const EngineNews& news) {
   for (std::size_t i = 0; i < news.channels.size(); ++i)
     update(*context_.axes.at(i), news.channels[i]);
   context_.motion_outputs.update(news.outputs);
+  // A path whose last mark has failed has not reached its end.
+  superviseOutputs();
 }
 
 void Controller::handleStops(const EngineNews& news) {

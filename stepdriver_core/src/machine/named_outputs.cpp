@@ -109,7 +109,7 @@ std::string NamedOutput::adopt(activity::Context& context) {
       state_.note = by_path.too_long ? tooLongText() : "";
     }
   }
-  if (by_path.error == std::exchange(error_seen_, by_path.error) || by_path.error == 0) return {};
+  if (by_path.failures == std::exchange(failures_seen_, by_path.failures)) return {};
   return failed(by_path.error, context);
 }
 

@@ -99,7 +99,8 @@ std::vector<pulse::OutputLine> Wiring::switchedOutputs(const MachineOptions& opt
   for (std::size_t i = 0; i < options.outputs.size(); ++i) {
     const config::OutputConfig& output = options.outputs[i];
     switched.push_back({named_outputs[i], output.active_level, output.min_on_ns, output.min_off_ns,
-                        output.max_on_ns.value_or(pulse::kNever)});
+                        output.max_on_ns.value_or(pulse::kNever),
+                        nanoseconds(options.write_timeout)});
   }
   return switched;
 }

@@ -1,6 +1,7 @@
 #include "pulse/engine_output.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <utility>
 
 #include "stepdriver_core/gpio/lines.h"
@@ -11,6 +12,8 @@ namespace {
 // What readers see of an output may be so old: an output that is switched at a high rate doesn't
 // keep the controller busy.
 constexpr Nanoseconds kTellEvery = 10'000'000;
+// How soon a write is known to have failed that another thread makes.
+constexpr Nanoseconds kLookEvery = 1'000'000;
 
 }  // namespace
 
@@ -27,7 +30,6 @@ void EngineOutput::follow(const FollowMarks& order) {
 void EngineOutput::adopt(std::uint64_t changes, const WrittenOutput& written) {
   if (changes == state_.changes) state_.written = written;
   state_.too_long = false;
-  state_.error = 0;
 }
 
 bool EngineOutput::end() {
@@ -59,7 +61,7 @@ Nanoseconds EngineOutput::tooLongAt() const {
 }
 
 Nanoseconds EngineOutput::due(Nanoseconds slipped) const {
-  const Nanoseconds told = untold_ ? tell_at_ : kNever;
+  const Nanoseconds told = std::min(untold_ ? tell_at_ : kNever, late_ ? late_->look_at : kNever);
   if (channel_ >= 0) {
     return std::min({compareDue(slipped), isWritten() ? tooLongAt() : kNever, told});
   }
@@ -67,7 +69,7 @@ Nanoseconds EngineOutput::due(Nanoseconds slipped) const {
 }
 
 bool EngineOutput::serve(Nanoseconds now, Nanoseconds slipped, PinRing* ring) {
-  bool worked = false;
+  bool worked = endLateWrites(now);
   while (serveMark(now, slipped, ring) || serveCompare(now, slipped, ring)) worked = true;
   if (worked) publish();
   untold_ = untold_ || worked;
@@ -203,10 +205,12 @@ bool EngineOutput::write(const OutputSetting& setting, Nanoseconds now, PinRing*
   if (setting == state_.written.setting) return true;
   const gpio::LineWrite write{line_.output, setting.on == line_.active, setting.part};
   if (const int error = lines_.write(&write, 1)) {
-    state_.error = error;
-    end();
-    mute();
+    fail(error);
     return false;
+  }
+  if (const gpio::LateWrites late = lines_.lateWrites(line_.output); late.ordered != 0 && !late_) {
+    late_ = Late{late.ordered, late.ended,    now + kLookEvery, 0,
+                 state_.group, marks_.made(), state_.compared};
   }
   WrittenOutput& last = state_.written;
   const bool is_switched = setting.on != last.setting.on;
@@ -219,10 +223,39 @@ bool EngineOutput::write(const OutputSetting& setting, Nanoseconds now, PinRing*
   return true;
 }
 
+void EngineOutput::fail(int error) {
+  ++state_.failures;
+  state_.error = error;
+  end();
+  mute();
+}
+
+// @return whether all have ended now, or one has failed
+bool EngineOutput::endLateWrites(Nanoseconds now) {
+  if (!late_ || now < late_->look_at) return false;
+  const gpio::LateWrites writes = lines_.lateWrites(line_.output);
+  if (writes.ended != std::exchange(late_->ended, writes.ended)) late_->looks = 0;
+  const bool failed = writes.failed >= late_->first;
+  const bool ended = writes.ended >= writes.ordered;
+  const bool hangs = !ended && ++late_->looks * kLookEvery >= line_.write_timeout;
+  if (!failed && !ended && !hangs) {
+    late_->look_at = now + kLookEvery;
+    return false;
+  }
+  const Late late = *std::exchange(late_, std::nullopt);
+  if (!failed && !hangs) return true;
+  fail(failed ? writes.error : ETIMEDOUT);
+  // What has been ordered since then counts as not made.
+  if (state_.ended == late.group) state_.ended_made = std::min(state_.ended_made, late.made);
+  state_.missed += state_.compared - late.compared;
+  state_.compared = late.compared;
+  return true;
+}
+
 void EngineOutput::publish() {
   state_.reads = state_.compare != 0 ? state_.compare : marks_.reads();
   state_.made = marks_.follows() ? marks_.made() : 0;
-  state_.due = marks_.due().has_value() || pulse_ends_ != kNever;
+  state_.due = marks_.due().has_value() || pulse_ends_ != kNever || late_;
   published_.store(state_);
 }
 

@@ -65,6 +65,8 @@ class EngineOutput {
     const WrittenOutput& last = state_.written;
     return last.switched + (last.setting.on ? line_.min_on : line_.min_off);
   }
+  bool endLateWrites(Nanoseconds now);
+  void fail(int error);
   bool isWritten() const { return channel_ >= 0 && !state_.muted; }
   bool write(const OutputSetting& setting, Nanoseconds now, PinRing* ring);
   void publish();
@@ -78,6 +80,17 @@ class EngineOutput {
   std::optional<bool> rests_;  // the state that it gets as soon as its least times allow
   Nanoseconds pulse_ends_ = kNever;
   bool reached_ = false;  // a motion has come to its end
+  // Writes that have not ended for certain, and what counted as made before the first of them.
+  struct Late {
+    std::uint64_t first = 0;  // its number
+    std::uint64_t ended = 0;
+    Nanoseconds look_at = 0;
+    Nanoseconds looks = 0;  // since a write has ended: a process that was suspended looks once
+    std::uint64_t group = 0;
+    std::uint64_t made = 0;
+    std::uint64_t compared = 0;
+  };
+  std::optional<Late> late_;
   OutputLineState state_;
   Nanoseconds tell_at_ = 0;  // The controller isn't told again before this clock time.
   bool untold_ = false;

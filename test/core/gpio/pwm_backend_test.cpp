@@ -3,22 +3,21 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <future>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "gpio/may_wait.h"
 #include "pwm_line.h"
 #include "stepdriver_core/error.h"
+#include "support/pwm_folder.h"
 
 // PWM outputs of the kernel, in a folder that looks like /sys/class/pwm.
 
@@ -28,57 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kServo = "pwmchip0:1/20000000/1000000/2000000";
-
-/// A chip with two channels, of which the second one is exported.
-class PwmFolder {
- public:
-  PwmFolder() {
-    char name[] = "/tmp/stepdriver-pwm-XXXXXX";
-    root_ = mkdtemp(name);
-    fs::create_directory(root_ / "pwmchip0");
-    write("npwm", "2");
-    write("export", "");
-    addChannel(1);
-  }
-  PwmFolder(const PwmFolder&) = delete;
-  PwmFolder& operator=(const PwmFolder&) = delete;
-  ~PwmFolder() { fs::remove_all(root_); }
-
-  std::string root() const { return root_; }
-  std::string path(const std::string& file) const { return root_ / "pwmchip0" / file; }
-  void addChannel(int number) const {
-    const std::string channel = "pwm" + std::to_string(number);
-    fs::create_directory(path(channel));
-    for (const char* const file : {"period", "duty_cycle", "enable"})
-      write(channel + "/" + file, "0");
-  }
-  void write(const std::string& file, const std::string& text) const {
-    std::ofstream(path(file)) << text << "\n";
-  }
-  std::string read(const std::string& file) const {
-    std::ifstream stream(path(file));
-    std::string text;
-    std::getline(stream, text);
-    return text;
-  }
-  /// Writes of the file fail with ENOSPC from now on.
-  void fill(const std::string& file) const {
-    fs::remove(path(file));
-    fs::create_symlink("/dev/full", path(file));
-  }
-  /// It can't be opened for writing.
-  void block(const std::string& file) const {
-    fs::remove(path(file));
-    fs::create_directory(path(file));
-  }
-  void repair(const std::string& file) const {
-    fs::remove(path(file));
-    write(file, "0");
-  }
-
- private:
-  fs::path root_;
-};
 
 /// Lines that remember what was written at once.
 class RecordedLines : public Lines {
@@ -142,9 +90,15 @@ class PwmBackendTest : public testing::Test {
     const LineWrite write{output, level};
     return lines.write(&write, 1);
   }
+  /// Returns when all writes of the first output have ended.
+  static LateWrites awaitEnd(const Lines& lines) {
+    LateWrites writes = lines.lateWrites(0);
+    for (; writes.ended < writes.ordered; writes = lines.lateWrites(0)) std::this_thread::yield();
+    return writes;
+  }
   std::string duty() const { return folder_.read("pwm1/duty_cycle"); }
 
-  PwmFolder folder_;
+  test::PwmFolder folder_;
   RecordedLines::Batches batches_;
   std::unique_ptr<Backend> backend_ =
       withPwm(std::make_unique<RecordedBackend>(batches_), folder_.root());
@@ -214,19 +168,42 @@ TEST_F(PwmBackendTest, AWriteOfThePulseThreadDoesNotWaitForTheFile) {
   ASSERT_EQ(mkfifo(folder_.path("pwm1/duty_cycle").c_str(), 0600), 0);
   this_thread_may_wait = false;
   EXPECT_EQ(write(*lines, 0, true), 0);
+  EXPECT_EQ(lines->lateWrites(0).ordered, 1U);
+  EXPECT_EQ(lines->lateWrites(0).ended, 0U);
   EXPECT_EQ(duty(), "2000000");
+  awaitEnd(*lines);
+  EXPECT_EQ(lines->lateWrites(0).failed, 0U);
   folder_.repair("pwm1/duty_cycle");
 }
 
-TEST_F(PwmBackendTest, AWriteThatFailsIsReportedUntilOneSucceeds) {
+TEST_F(PwmBackendTest, AWriteThatFailsReturnsItsError) {
   const auto lines = request(kServo);
   folder_.fill("pwm1/duty_cycle");
   EXPECT_EQ(write(*lines, 0, true), ENOSPC);
-  this_thread_may_wait = false;
-  EXPECT_EQ(write(*lines, 0, false), ENOSPC) << "that of the last one that ended";
-  this_thread_may_wait = true;
+  EXPECT_EQ(lines->lateWrites(0).ordered, 0U) << "it was waited for";
   folder_.repair("pwm1/duty_cycle");
   EXPECT_EQ(write(*lines, 0, true), 0);
+  EXPECT_EQ(duty(), "2000000");
+}
+
+TEST_F(PwmBackendTest, AWriteOfThePulseThreadThatFailsIsKnownWhenItHasEnded) {
+  const auto lines = request(kServo);
+  folder_.fill("pwm1/duty_cycle");
+  this_thread_may_wait = false;
+  EXPECT_EQ(write(*lines, 0, true), 0);
+  const LateWrites first = awaitEnd(*lines);
+  EXPECT_EQ(first.failed, first.ordered);
+  EXPECT_EQ(first.error, ENOSPC);
+  // What another thread writes is told to that one.
+  this_thread_may_wait = true;
+  EXPECT_EQ(write(*lines, 0, false), ENOSPC);
+  EXPECT_EQ(lines->lateWrites(0).failed, first.ordered);
+  folder_.repair("pwm1/duty_cycle");
+  this_thread_may_wait = false;
+  EXPECT_EQ(write(*lines, 0, true), 0);
+  const LateWrites second = awaitEnd(*lines);
+  EXPECT_GT(second.ordered, first.ordered);
+  EXPECT_EQ(second.failed, first.ordered) << "the one before";
   EXPECT_EQ(duty(), "2000000");
 }
 

@@ -5,14 +5,19 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "gpio/may_wait.h"
+#include "gpio/pwm_backend.h"
 #include "port/klipper/board_backend.h"
 #include "setup/simulated_link.h"
 #include "sim/fake_board.h"
 #include "support/bench.h"
+#include "support/making_backend.h"
 #include "support/port_on_board.h"
+#include "support/pwm_folder.h"
 #include "support/recording_lines.h"
 #include "support/refusal.h"
 
@@ -23,6 +28,7 @@ namespace {
 
 constexpr int kStepPin = 2;
 constexpr int kEnablePin = 4;
+constexpr const char* kLaser = "pwmchip0:1/200000/0/200000";
 constexpr int kButton = 0;  // the input of pin PinsOnLines::kFirstInput
 
 /// A fake board with a cable that can be pulled.
@@ -140,6 +146,30 @@ TEST_F(MachineOnBoard, SaysInTheFaultOfAnAxisWhyItsFirmwareHasShutDown) {
             "the STEP line mcu:gpio2 can't be written: the firmware of the board mcu has shut "
             "down: Timer too close");
   EXPECT_FALSE(state.position_valid);
+}
+
+TEST_F(MachineOnBoard, APwmOutputOfTheComputerHasItsValueAndItsFailure) {
+  const test::PwmFolder folder;
+  const auto pwm =
+      gpio::withPwm(std::make_unique<test::MakingBackend>([this](const auto&, const auto&) {
+                      return std::make_unique<test::RecordingLines>(clock_);
+                    }),
+                    folder.root());
+  BoardBackend backend(*pwm, clock_, {{"mcu", "fake"}},
+                       [this](const BoardSettings& board) { return mcu_.link(board.name); });
+  const auto lines = backend.request({{"mcu:gpio4", false, false}, {kLaser, false, false}}, {});
+  const gpio::LineWrite quarter{1, true, gpio::LineWrite::kWhole / 4};
+  EXPECT_EQ(lines->write(&quarter, 1), 0);
+  EXPECT_NEAR(std::stod(folder.read("pwm1/duty_cycle")), 50'000.0, 5.0);
+  folder.fill("pwm1/duty_cycle");
+  gpio::this_thread_may_wait = false;
+  EXPECT_EQ(lines->write(&quarter, 1), 0);
+  gpio::this_thread_may_wait = true;
+  gpio::LateWrites late = lines->lateWrites(1);
+  for (; late.ended < late.ordered; late = lines->lateWrites(1)) std::this_thread::yield();
+  EXPECT_EQ(late.failed, late.ordered);
+  EXPECT_EQ(late.error, ENOSPC);
+  EXPECT_EQ(lines->lateWrites(0).ordered, 0U);
 }
 
 // ---- recover ----

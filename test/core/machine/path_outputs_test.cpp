@@ -563,6 +563,19 @@ TEST_F(PathOutputs, AnOutputThatCannotBeWrittenIsAFaultThatNamesIt) {
   EXPECT_EQ(finish(dashes({5000, 6000, 7000})).marks_made, 2U);
 }
 
+TEST_F(PathOutputs, AFailureAtTheEndOfAPathIsItsResult) {
+  PathRequest request = dashes({800, 2000});
+  request.segments.push_back(with(lineTo({stepTo(2000), 0.0}), {{"pen", false}}));
+  const CoordinatedMove move = followPath(request);
+  while (!isOn(0)) advance(1e-3);
+  bench->rig.failWrites("pen.line", 0, EIO);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(steps("x").size(), 2000U);
+  EXPECT_EQ(result.end, MoveEnd::kFault) << result.message;
+  EXPECT_EQ(result.marks_made, 1U);
+  EXPECT_EQ(result.marks_not_made, 1U);
+}
+
 TEST_F(PathOutputs, AppendedSegmentsContinueThem) {
   PathRequest request = dashes({400, 800, 1200});
   request.more_follows = true;

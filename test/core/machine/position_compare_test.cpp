@@ -580,6 +580,22 @@ TEST_F(PositionCompareTest, AnOutputThatCannotBeWrittenIsAFaultThatNamesIt) {
   EXPECT_EQ(switchedOn().size(), 4U) << "at 0.06 and 0.07";
 }
 
+// As soon as the position has it, without a motion.
+TEST_F(PositionCompareTest, AnOutputThatFailsOnceMoreIsAFaultOnceMore) {
+  for (int i = 0; i < 3; ++i) {
+    bench->rig.failWrites("camera.line", 0, EIO);
+    machine().setPositionCompare("camera", cam(-0.01, 0.01));
+    advance(1e-3);
+    EXPECT_NE(state("x").fault.find("of the output camera can't be written: EIO"),
+              std::string::npos)
+        << i << ": " << state("x").fault;
+    machine().clearPositionCompare("camera");
+    bench->rig.clearWriteFault("camera.line");
+    machine().recover();
+    bench->axis("x").setPosition(0.0);
+  }
+}
+
 // ---- random motions ----
 
 class RandomPositionCompare : public PositionCompareTest, public testing::WithParamInterface<int> {

@@ -18,6 +18,9 @@ class PassingLines : public gpio::Lines {
   int write(const gpio::LineWrite* writes, std::size_t count) noexcept override {
     return lines_->write(writes, count);
   }
+  gpio::LateWrites lateWrites(int output) const noexcept override {
+    return lines_->lateWrites(output);
+  }
   int read(int input) noexcept override { return lines_->read(input); }
   int waitForEdges(std::int64_t timeout_ns, gpio::EdgeEvent* events,
                    std::size_t capacity) noexcept override {

@@ -38,6 +38,15 @@ struct LineWrite {
   std::uint16_t part = kWhole;
 };
 
+/// What has become of an output's writes that another thread makes after Lines::write() has
+/// returned. Writes have numbers that rise, from 1.
+struct LateWrites {
+  std::uint64_t ordered = 0;  ///< the number of the last one; 0: this output has had no such write
+  std::uint64_t ended = 0;    ///< this one has ended, and all before it
+  std::uint64_t failed = 0;   ///< the number of the last one that has failed; 0: none has
+  int error = 0;              ///< errno of that one
+};
+
 /// An edge of an input. It is only a wake-up and a time: edges may be lost, doubled or late, so use
 /// read() for the level.
 struct EdgeEvent {
@@ -74,8 +83,11 @@ class Lines {
   /// matters, write them in separate calls.
   ///
   /// @return 0, or the errno of the failed call; each of these outputs may then have changed or
-  ///   not.
+  ///   not. For the pulse thread, the end of a write of a PWM output is in lateWrites().
   [[nodiscard]] virtual int write(const LineWrite* writes, std::size_t count) noexcept = 0;
+
+  /// The writes of an output for which write() doesn't wait, by its index in the request.
+  [[nodiscard]] virtual LateWrites lateWrites(int /*output*/) const noexcept { return {}; }
 
   /// @return the level of an input, by its index in the request (0 or 1), or -errno.
   [[nodiscard]] virtual int read(int input) noexcept = 0;

@@ -130,7 +130,7 @@ class BoardBackend::HeldLines final : public gpio::Lines {
       const Output& output = outputs_[static_cast<std::size_t>(writes[i].output)];
       if (output.board == nullptr) {
         if (base_count == base.size()) return EINVAL;
-        base[base_count++] = {output.base, writes[i].level};
+        base[base_count++] = {output.base, writes[i].level, writes[i].part};
         continue;
       }
       if (output.board->failure() != 0) return output.board->failure();
@@ -144,6 +144,10 @@ class BoardBackend::HeldLines final : public gpio::Lines {
     }
     if (base_count != count) backend_.clock_.wake();
     return base_count == 0 ? 0 : base_->write(base.data(), base_count);
+  }
+  gpio::LateWrites lateWrites(int output) const noexcept override {
+    const Output& line = outputs_[static_cast<std::size_t>(output)];
+    return line.board == nullptr ? base_->lateWrites(line.base) : gpio::LateWrites{};
   }
 
   int read(int input) noexcept override {
