@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/axes.h"
@@ -102,6 +103,24 @@ TEST(Screen, ShowsOutputsAndInputsWithTheAgeOfTheirStates) {
                             "INPUT paper: the chip is gone"}) {
     EXPECT_TRUE(shows(wrong, words));
   }
+}
+
+TEST(Screen, ShowsTheValueOfAPwmOutput) {
+  Session session = sessionWith({axisView("x")});
+  OutputView laser{"laser", true, -3.5, "", ""};
+  // As a part of 65535.
+  for (const auto& [value, words] :
+       {std::pair{16384.0 / 65535.0, "> laser: on at 0.25 3 s"},
+        std::pair{1.0 / 65535.0, "> laser: on at 1.53e-05 3 s"},
+        std::pair{65534.0 / 65535.0, "> laser: on 3 s"}, std::pair{1.0, "> laser: on 3 s"}}) {
+    laser.value = value;
+    session.driver().updateIo({laser}, {});
+    EXPECT_TRUE(shows(screenText(session, 24, 80), words));
+  }
+  laser.on = false;
+  laser.value = 0.0;
+  session.driver().updateIo({laser}, {});
+  EXPECT_TRUE(shows(screenText(session, 24, 80), "> laser: off 3 s"));
 }
 
 TEST(Screen, ShowsWhatAPositionMakesOfAnOutput) {

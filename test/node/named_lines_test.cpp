@@ -102,6 +102,28 @@ TEST_F(PwmOutput, HasValuesByAServiceAndByATopic) {
   }
 }
 
+TEST_F(PwmOutput, HasItsValueInTheDiagnostics) {
+  node.start();
+  const Recorder<diagnostic_msgs::DiagnosticArray> reports("/diagnostics");
+  const auto shows = [&](const std::string& output, const std::string& words) {
+    return reports.waitForLatest([&](const diagnostic_msgs::DiagnosticArray& report) {
+      for (const auto& status : report.status) {
+        for (const auto& value : status.values) {
+          if (value.key == "output " + output) return value.value == words;
+        }
+      }
+      return false;
+    });
+  };
+  EXPECT_TRUE(setValue("pen", 0.4).success);
+  EXPECT_TRUE(shows("pen", "on at 0.4"));
+  EXPECT_TRUE(set("pen", true).success);
+  EXPECT_TRUE(shows("pen", "on"));
+  EXPECT_TRUE(setValue("pen", 0.0).success);
+  EXPECT_TRUE(shows("pen", "off"));
+  EXPECT_TRUE(shows("relay", "on")) << "a plain line";
+}
+
 TEST_F(NamedLines, AreSwitchedByAServiceAndShownByALatchedTopic) {
   node.start();
   const SetOutput::Response response = set("pen", true);

@@ -11,6 +11,12 @@ from .units import in_page_units
 STALE_AFTER = 1.0  # [s] the driver publishes its states ten times a second
 
 
+def output_words(on, value):
+    """The state of an output, as the console shows it: "off", "on" or, of a PWM output in part, "on at 0.25"."""
+    rounded = f"{value:.3g}"
+    return "off" if not on else "on" if rounded == "1" else f"on at {rounded}"
+
+
 class Machine:
     def __init__(self, driver):
         self.driver = driver
@@ -80,10 +86,10 @@ class Machine:
             def changed(stamp):
                 return None if stamp.is_zero() else round(stamp.to_sec() + to_monotonic, 3)
             self._io = {
-                "outputs": [{"name": name, "on": on, "changed": changed(stamp), "note": in_page_units(note),
-                             "error": error}
-                            for name, on, stamp, note, error in zip(
-                                message.output_name, message.output_on, message.output_changed,
+                "outputs": [{"name": name, "on": on, "words": output_words(on, value), "changed": changed(stamp),
+                             "note": in_page_units(note), "error": error}
+                            for name, on, value, stamp, note, error in zip(
+                                message.output_name, message.output_on, message.output_value, message.output_changed,
                                 message.output_note, message.output_error)],
                 "inputs": [{"name": name, "active": active, "changed": changed(stamp), "error": error}
                            for name, active, stamp, error in zip(

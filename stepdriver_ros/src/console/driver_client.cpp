@@ -263,7 +263,7 @@ void DriverClient::onMessage(const IoStates& states) {
     outputs.push_back({states.output_name[i], states.output_on[i] != 0,
                        changed(states.output_changed[i]), states.output_note[i],
                        states.output_error[i], states.output_axis[i], states.output_compared[i],
-                       states.output_missed[i]});
+                       states.output_missed[i], states.output_value[i]});
   }
   std::vector<InputView> inputs;
   for (std::size_t i = 0; i < states.input_name.size(); ++i) {

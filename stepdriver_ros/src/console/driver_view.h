@@ -42,6 +42,7 @@ struct OutputView {
   std::string axis = {};          ///< whose position switches it; empty: none does
   std::uint64_t compared = 0;     ///< what positions have made it do
   std::uint64_t missed = 0;       ///< what they could not
+  double value = 1.0;             ///< while it is on: below 1, a PWM output is on in part
 };
 
 /// The state of an input with a name.

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "axis_table.h"
+#include "common/io_words.h"
 #include "wrapped.h"
 
 namespace stepdriver::console {
@@ -176,7 +177,7 @@ std::string ageText(const std::optional<double>& changed, double now) {
 std::vector<Row> ioRows(const Session& session, int columns, double now) {
   const DriverView& driver = session.driver();
   const bool live = driver.live(now);
-  const auto text = [&](const std::string& name, const char* state, const auto& changed) {
+  const auto text = [&](const std::string& name, const std::string& state, const auto& changed) {
     return fmt::format(live ? "{}: {} {}" : "{}: [{} {}]", shortName(name, kShortName), state,
                        ageText(changed, now));
   };
@@ -184,8 +185,9 @@ std::vector<Row> ioRows(const Session& session, int columns, double now) {
   const OutputView* const chosen = session.chosenOutput();
   std::vector<std::string> texts{"outputs"};
   for (const OutputView& output : driver.outputs()) {
-    std::string shown = (output.name == chosen->name ? "> " : "") +
-                        text(output.name, output.on ? "on" : "off", output.changed);
+    std::string shown =
+        (output.name == chosen->name ? "> " : "") +
+        text(output.name, ros_node::outputWords(output.on, output.value), output.changed);
     if (!output.axis.empty()) {
       shown += fmt::format(", by {}: {} made, {} missed", shortName(output.axis, kShortName),
                            output.compared, output.missed);

@@ -25,6 +25,7 @@ recorder: {folder: FOLDER/recordings, keep: 5}
 outputs:
   pen: {pin: GPIO5, active_level: high, initial: off, at_fault: off}
   lamp: {pin: GPIO6, active_level: high, initial: off, at_fault: off}
+  laser: {pwm: {chip: 0, channel: 0, frequency_hz: 5000.0}}
 inputs:
   paper: {pin: GPIO12, active_level: high}
 axes:

@@ -6,7 +6,7 @@ import unittest
 
 from machine import Machine, Network, Page, browser, wait_until
 from selenium.webdriver.common.keys import Keys
-from stepdriver.srv import MoveTo, SetOutput, SpeedOverride
+from stepdriver.srv import MoveTo, SetOutput, SetOutputValue, SpeedOverride
 
 JOG_TIMEOUT = 1.5  # [s] of the machine: longer than a busy browser takes between two messages
 PRESSES = 5  # a jog may end by itself on a busy computer
@@ -133,6 +133,15 @@ class Controls(OnTheMachine):
         self.page.click(switch)
         wait_until(lambda: "set output" in self.page.find("#events").text, "the refusal is listed")
         self.assertFalse(machine.is_on("pen"))
+
+    def test_a_pwm_output_shows_its_value(self):
+        wait_until(lambda: self.line("laser").startswith("off "), "the laser is off")
+        machine.call("set_output_value", SetOutputValue, name="laser", value=0.4)
+        wait_until(lambda: self.line("laser").startswith("on at 0.4 for "), "it is on in part")
+        self.page.click('#outputs [data-name="laser"] button')
+        wait_until(lambda: self.line("laser").startswith("off for "), "the switch is that of an output that is on")
+        self.page.click('#outputs [data-name="laser"] button')
+        wait_until(lambda: self.line("laser").startswith("on for "), "it is on")
 
     def test_inputs_show_their_state_and_its_age(self):
         from std_srvs.srv import SetBool

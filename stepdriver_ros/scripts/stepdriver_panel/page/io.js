@@ -20,8 +20,8 @@ class Line {
     this.root.append(label, this.state, ...(button ? [button] : []));
   }
 
-  tell(word, state) {
-    this.word = word;
+  tell(words, state) {
+    this.words = words;
     this.changed = state.changed;
     this.why = state.error || state.note || "";
     this.state.classList.toggle("bad", Boolean(state.error));
@@ -29,7 +29,7 @@ class Line {
 
   age(tick) {
     const since = this.changed === null ? "since the start" : `for ${ageText(tick - this.changed)}`;
-    setText(this.state, `${this.word} ${since}${this.why ? `: ${this.why}` : ""}`);
+    setText(this.state, `${this.words} ${since}${this.why ? `: ${this.why}` : ""}`);
   }
 }
 
@@ -48,7 +48,7 @@ class Output extends Line {
     this.on = state.on;
     this.button.setAttribute("aria-checked", String(state.on));
     setText(this.button, state.on ? "Switch off" : "Switch on");
-    super.tell(state.on ? "on" : "off", state);
+    super.tell(state.words, state);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "axis_diagnostics.h"
+#include "common/io_words.h"
 #include "engine_diagnostics.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
@@ -113,7 +114,7 @@ void Diagnostics::fillNamedLinesStatus(Status& status) const {
     if (!output.note.empty()) {
       status.mergeSummary(Status::WARN, fmt::format("{} {}", output.name, output.note));
     }
-    add("output " + output.name, output.on ? "on" : "off", output.error);
+    add("output " + output.name, outputWords(output.on, output.value), output.error);
   }
   for (const machine::InputState& input : states.inputs) {
     add("input " + input.name, input.active ? "active" : "inactive", input.error);
