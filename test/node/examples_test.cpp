@@ -6,6 +6,7 @@
 #include <sensor_msgs/Joy.h>
 #include <std_srvs/SetBool.h>
 #include <stepdriver/AxisStates.h>
+#include <stepdriver/IoStates.h>
 #include <stepdriver/Microstep.h>
 #include <stepdriver/MoveRounds.h>
 #include <stepdriver/MoveTo.h>
@@ -177,6 +178,26 @@ TEST(Examples, PsocSketchDrawsAndThenSleeps) {
       [](const AxisStates& s) { return s.idle.at(0) != 0 && s.idle.at(1) != 0; }));
   EXPECT_TRUE(moveBy(node + "/x", 0.01).success) << "it wakes by itself";
   EXPECT_EQ(rigOf(node).pulses_forward, (Counts{800, 600}));
+}
+
+// The pen is on for each stroke, and not between them.
+TEST(Examples, PsocSketchLiftsItsPen) {
+  const std::string node = "/psoc/stepdriver";
+  const Recorder<IoStates> outputs(node + "/io_states");
+  const TemporaryFile points(".txt");
+  const TemporaryFile picture(".png");
+  std::ofstream(points.path()) << "0 0\n10 0\n\n20 0\n30 0\n";
+  ASSERT_TRUE(outputs.waitForLatest([](const IoStates& io) { return io.output_on.at(0) == 0; }));
+  const auto end =
+      runProgram("draw", {points.path(), "--node", node, "-o", picture.path(), "--pen", "pen"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_TRUE(outputs.waitForLatest([](const IoStates& io) { return io.output_on.at(0) == 0; }));
+  std::vector<ros::Time> lowered;
+  for (const IoStates& io : outputs.messages()) {
+    const bool is_new = lowered.empty() || io.output_changed.at(0) != lowered.back();
+    if (io.output_on.at(0) != 0 && is_new) lowered.push_back(io.output_changed.at(0));
+  }
+  EXPECT_EQ(lowered.size(), 2U);
 }
 
 // Wired common-anode, with its own deceleration; 20 revolutions, a single step, and a new move at
