@@ -263,6 +263,10 @@ std::vector<Act> makeActs() {
        }},
       {"latch at the probe", [](Participants& all, int client) { all.beginLatch(client); }},
       {"end the latch", [](Participants& all, int client) { all.endLatches(client); }},
+      {"path of x and y that switches the tool",
+       [](Participants& all, int client) {
+         all.postMarkedPath(client, {kX, kY}, 0.006);
+       }},
   };
 }
 

@@ -1484,6 +1484,14 @@ void Participants::postPath(int client, const std::vector<std::size_t>& axes, do
   followPath(client, axes, size, request);
 }
 
+void Participants::postMarkedPath(int client, const std::vector<std::size_t>& axes, double size) {
+  motion::PathRequest request{
+      {}, {lineTo({size, 0.0}), lineTo({size, size}), lineTo({0.0, size})}, true, 0.0, size / 10.0};
+  request.segments[1].outputs = {{kTool, true}};
+  request.segments[2].outputs = {{kTool, false, 1.0, 0.5 * size}};
+  followPath(client, axes, size, request);
+}
+
 void Participants::postSlowPath(int client, const std::vector<std::size_t>& axes, double first,
                                 double second) {
   // [s] Each of the lines: both end before kLongestCall with an override of 0.4 too.
@@ -1519,25 +1527,28 @@ void Participants::followPath(int client, const std::vector<std::size_t>& axes, 
     meaning.reaches[axis] = reachOfPath(size, request.tolerance);
   }
   try {
-    motion::PathPlan plan = motion::planPath(request, facts, origins);
+    motion::PathPlan plan =
+        motion::planPath(request, facts, origins, optionsOf(schedule_.variant).outputs);
     wanted.path->targets = plan.targets;
     wanted.path->window = plan.window;
-    wanted.prepared =
-        std::make_shared<const motion::PreparedTrajectory>(facts, plan.points, expected);
+    wanted.prepared = std::make_shared<const motion::PreparedTrajectory>(
+        facts, plan.points, expected, false, std::move(plan.marks));
   } catch (const Refused& refused) {
     return note(std::string("the path is refused: ") + refused.what());
   }
   // Posting the request is a separate step.
   Client& who = clients_[static_cast<std::size_t>(client)];
+  std::size_t marks = 0;
+  for (const motion::PathSegment& segment : request.segments) marks += segment.outputs.size();
   who.next = [=, more_follows = request.more_follows] {
     post(client, "follow path", wanted, meaning);
     clients_[static_cast<std::size_t>(client)].on_answer = [=](const activity::Reply& reply) {
       if (reply.failure) return;
       for (const std::size_t axis : axes) path_axes_[axis] = axes;
+      const auto& moves = std::get<std::vector<axis::Move>>(reply.value);
+      if (marks > 0) marked_.emplace_back(moves.front().outcome, marks);
       if (!more_follows) return;
-      for (const axis::Move& move : std::get<std::vector<axis::Move>>(reply.value)) {
-        open_paths_.insert(move.id);
-      }
+      for (const axis::Move& move : moves) open_paths_.insert(move.id);
     };
   };
 }
@@ -2243,6 +2254,21 @@ void Participants::checkOutcomes() {
   }
 }
 
+// Each place of a path is switched once, or counted as one that was not. A fault of any axis takes
+// the outputs to their safe states.
+void Participants::checkMarks() {
+  for (const auto& [outcome, marks] : marked_) {
+    const auto result = outcome->get();
+    if (!result) continue;  // checkOutcomes() says so
+    const bool is_whole = result->end == axis::MoveEnd::kReached && !pins_failed_;
+    const bool all_made = !is_whole || result->marks_not_made == 0;
+    if (result->marks_made + result->marks_not_made == marks && all_made) continue;
+    oracle_.complain(fmt::format("a path has made {} of its {} switches and not made {}: {}",
+                                 result->marks_made, marks, result->marks_not_made,
+                                 result->message));
+  }
+}
+
 void Participants::checkInPosition() {
   for (std::size_t i = never_in_position_.value_or(moves_.size()); i < moves_.size(); ++i) {
     const auto& [name, move] = moves_[i];
@@ -2398,6 +2424,7 @@ std::vector<std::string> Participants::run() {
   if (oracle_.complaints.empty()) checkCounts("at rest");
   if (oracle_.complaints.empty()) checkRest();
   if (oracle_.complaints.empty()) checkRegisters();
+  if (oracle_.complaints.empty()) checkMarks();
   if (oracle_.complaints.empty()) checkCompared();
   if (oracle_.complaints.empty()) checkLatches();
   for (std::size_t axis = 0; axis < kAxes && oracle_.complaints.empty(); ++axis) checkHull(axis);

@@ -161,6 +161,8 @@ class Participants : private machine::ShellCore::Host {
   void postLaterTrajectory(int client, std::vector<std::size_t> axes, double size);
   /// A path of several axes at rest that can be fed until appendToPath() ends it.
   void postPath(int client, const std::vector<std::size_t>& axes, double size);
+  /// One that switches the tool on at its second line, and off in the middle of its third.
+  void postMarkedPath(int client, const std::vector<std::size_t>& axes, double size);
   /// Two short lines at these speeds [m/s], each of which takes at most half a minute.
   void postSlowPath(int client, const std::vector<std::size_t>& axes, double first, double second);
   /// Appends to the path that an axis follows, if it is one; a last segment ends it.
@@ -306,6 +308,7 @@ class Participants : private machine::ShellCore::Host {
   void prepareAndPost(int client, const Wish& wish, int tries);
   void followPath(int client, const std::vector<std::size_t>& axes, double size,
                   motion::PathRequest request);
+  void checkMarks();
   /// A probing under way: its touches, and the way back between them.
   struct ProbingUnderWay {
     machine::ProbeStroke stroke;
@@ -421,6 +424,9 @@ class Participants : private machine::ShellCore::Host {
   bool close_was_served_ = false;
   std::vector<std::pair<std::string, axis::Move>> moves_;
   std::set<std::uint64_t> open_paths_;            // moves along paths of which more is to come
+  // The outcomes of paths that switch an output, and how often each does.
+  std::vector<std::pair<std::shared_ptr<const axis::Outcome<axis::MoveResult>>, std::size_t>>
+      marked_;
   std::optional<std::size_t> never_in_position_;  // how many moves there were by then
   std::array<std::uint64_t, kAxes> last_move_{};
   std::array<std::vector<Ordered>, kAxes> ordered_;
