@@ -85,6 +85,7 @@ class HomingToBlock final : public Homing {
   void approach(axis::HomingPhase phase);
   void backOff();
   void notBlocked();
+  bool reports() const;
   /// What reports the block, in words.
   std::string sensor() const;
 

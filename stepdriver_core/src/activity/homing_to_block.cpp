@@ -13,9 +13,14 @@ std::string HomingToBlock::sensor() const {
   return "the input " + config_.input;
 }
 
-void HomingToBlock::start() {
+// That of a fault output is a fault of the driver.
+bool HomingToBlock::reports() const {
   const auto& input = axis_.motor.lines().homing_input;
-  if (input && (axis_.readInput(input->signal.line) != 0) == input->signal.active) {
+  return input && (axis_.readInput(input->signal.line) != 0) == input->signal.active;
+}
+
+void HomingToBlock::start() {
+  if (reports()) {
     return failNow(sensor() + " reports a block before the axis has moved");
   }
   approach(axis::HomingPhase::kSeeking);
@@ -63,7 +68,11 @@ void HomingToBlock::strokeEnded() {
                                end == axis::MoveEnd::kEndstopMin ? "min" : "max", nameOf(phase())));
   }
   if (approaches) return notBlocked();
-  if (phase() == axis::HomingPhase::kBackingOff) return approach(axis::HomingPhase::kLatching);
+  if (phase() == axis::HomingPhase::kBackingOff) {
+    if (!reports()) return approach(axis::HomingPhase::kLatching);
+    return failNow(
+        fmt::format("{} still reports a block {} off it", sensor(), axis_.show(config_.pull_off)));
+  }
   succeed(trigger_);
 }
 

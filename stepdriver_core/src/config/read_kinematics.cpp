@@ -226,6 +226,11 @@ class KinematicsReader {
 
   void checkHoming(const AxisConfig& axis, const std::vector<std::string>& names) {
     if (!axis.homing) return;
+    if (axis.homing->kind == HomingKind::kIndex) {
+      issue("axes", fmt::format("has {}, whose homing/kind must not be index: an index comes once "
+                                "a turn of a motor, which the other axes turn too",
+                                axis.name));
+    }
     const double unit = configUnitsPerUnit(axis.kind);
     if (const double restart = restartSpeed(axis); axis.homing->seek_speed > restart * kSlack) {
       issue("axes",

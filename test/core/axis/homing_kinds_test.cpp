@@ -1,20 +1,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iterator>
 #include <memory>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/error.h"
-#include "support/homing_bench.h"
+#include "support/homing_kinds_bench.h"
 
 // Homings to something else than a limit switch, on the rig: 80 steps/mm, endstops at -100 mm and
 // 100 mm.
@@ -26,67 +24,19 @@ using axis::HomingEnd;
 using axis::HomingResult;
 using config::HomingKind;
 using test::Bench;
+using test::blockAxis;
+using test::flagAxis;
+using test::flagOf;
 using test::homingAxis;
+using test::HomingKindsTest;
+using test::indexAxis;
+using test::inputNamed;
 using test::kStep;
 using test::violationsOf;
 
-class HomingKinds : public testing::Test {
- protected:
-  /// A machine of one axis.
-  void build(const config::AxisConfig& config, const std::vector<config::InputConfig>& inputs,
-             const std::function<void(sim::RigAxisSpec&)>& change) {
-    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
-    change(specs[0]);
-    machine::MachineOptions options;
-    options.inputs = inputs;
-    bench = std::make_unique<Bench>(std::vector<config::AxisConfig>{config}, specs, false, 0.0,
-                                    options);
-  }
-
-  axis::Axis& x() { return bench->axis(); }
-  double carriage() { return bench->report().carriage / 1000.0; }
-
-  /// [steps] How far the home position is from where it should be, by the carriage.
-  /// @param trigger [m] where the carriage was at the trigger point.
-  double errorOf(double trigger) {
-    const double offset = x().config().homing->offset;
-    return (x().state().position - offset - (carriage() - trigger)) / kStep;
-  }
-
-  std::unique_ptr<Bench> bench;
-};
-
-config::InputConfig inputOf(const std::string& name) {
-  config::InputConfig input;
-  input.name = name;
-  input.line = {"io." + name, true, Bias::kAsIs};
-  return input;
-}
-
 // ---- a block ----
 
-config::AxisConfig blockAxis(int approaches = 1) {
-  config::AxisConfig config = homingAxis();
-  config.endstop_min.reset();
-  config.endstop_max.reset();
-  config.homing->kind = HomingKind::kBlock;
-  config.homing->input = "stall";
-  config.homing->approaches = approaches;
-  config.homing->latch_speed = approaches == 2 ? 0.01 : 0.0;
-  return config;
-}
-
-class HomingToBlockTest : public HomingKinds {
- protected:
-  /// The block is at -80 mm.
-  void buildBlock(const config::AxisConfig& config, double start = 0.0, bool wired = true) {
-    build(config, {inputOf("stall")}, [&](sim::RigAxisSpec& spec) {
-      spec.start = start;
-      spec.block_min = -80.0;
-      if (wired) spec.stall_line = "io.stall";
-    });
-  }
-};
+class HomingToBlockTest : public HomingKindsTest {};
 
 TEST_F(HomingToBlockTest, EndsAtTheFirstStepThatTheBlockStops) {
   buildBlock(blockAxis());
@@ -112,34 +62,10 @@ TEST_F(HomingToBlockTest, ComesAgainSlowlyIfTwoApproachesAreConfigured) {
   EXPECT_NEAR(static_cast<double>(*last - *std::prev(last)), 1e9 / 800.0, 2.0);
 }
 
-TEST_F(HomingToBlockTest, FromAnyPlaceFindsTheSameOne) {
-  std::mt19937 random(37);
-  std::uniform_real_distribution<double> starts(-79.9, 60.0);
-  double least = 1e9;
-  double most = -1e9;
-  for (int i = 0; i < 1000; ++i) {
-    const double start = std::round(starts(random) * 80.0) / 80.0;
-    const bool is_missing = i % 20 == 19;
-    buildBlock(blockAxis(1 + i % 2), start, !is_missing);
-    const HomingResult result = x().home();
-    if (is_missing) {
-      ASSERT_NE(result.message.find("the input stall didn't report a block within max_travel"),
-                std::string::npos)
-          << start << ": " << result.message;
-      continue;
-    }
-    ASSERT_EQ(result.end, HomingEnd::kHomed) << start << ": " << result.message;
-    least = std::min(least, errorOf(-0.08));
-    most = std::max(most, errorOf(-0.08));
-  }
-  EXPECT_LE(most - least, 1.0);
-  RecordProperty("spread_in_thousandths_of_a_step", static_cast<int>(1e3 * (most - least)));
-}
-
 TEST_F(HomingToBlockTest, SaysThatNothingReportedTheBlock) {
   config::AxisConfig config = blockAxis();
   config.homing->max_travel = 0.1;
-  buildBlock(config, 0.0, false);
+  buildBlock(config, {}, false);
   const HomingResult result = x().home();
   EXPECT_EQ(result.end, HomingEnd::kFailed);
   EXPECT_EQ(result.message,
@@ -178,6 +104,33 @@ TEST_F(HomingToBlockTest, SaysThatTheSecondApproachMetNoBlock) {
                 "first one"),
             std::string::npos)
       << result.message;
+}
+
+// A report that never ends would be taken for the block of the second approach.
+TEST_F(HomingToBlockTest, SaysThatTheReportDoesNotEndAfterTheFirstApproach) {
+  buildBlock(blockAxis(2));
+  const HomingResult result = x().home([&] {
+    if (x().state().homing == axis::HomingPhase::kBackingOff) {
+      bench->rig.stickInput("stall", true, bench->clock.now());
+    }
+    return false;
+  });
+  EXPECT_EQ(result.message,
+            "x isn't homed: the input stall still reports a block 0.002 m off it; it stands at "
+            "-0.07801 m");
+  EXPECT_FALSE(x().state().position_valid);
+}
+
+TEST_F(HomingToBlockTest, SaysThatNothingReportedTheBlockInTime) {
+  config::AxisConfig config = blockAxis(2);
+  config.homing->timeout = 1.0;  // the block is 1.6 s away
+  buildBlock(config);
+  expectFails("x isn't homed: the input stall didn't report a block within timeout_s, 1 s");
+  EXPECT_FALSE(x().state().position_valid);
+  config.homing->latch_speed = 0.001;  // 2 s for the second approach
+  config.homing->timeout = 3.0;
+  buildBlock(config);
+  expectFails("the input stall didn't report a block again within timeout_s, 3 s");
 }
 
 // The drivers' outputs for stalls are pulses: between two steps nothing may read them.
@@ -262,7 +215,7 @@ TEST_F(HomingToBlockTest, CanBeReportedByTheFaultOutputOfTheDriver) {
 
 TEST_F(HomingToBlockTest, NeedsAnInputThatIsThere) {
   try {
-    build(blockAxis(), {inputOf("probe")}, [](sim::RigAxisSpec& /*spec*/) {});
+    build(blockAxis(), {inputNamed("probe")}, [](sim::RigAxisSpec& /*spec*/) {});
     ADD_FAILURE() << "the machine was made";
   } catch (const ConfigError& error) {
     EXPECT_NE(
@@ -275,107 +228,7 @@ TEST_F(HomingToBlockTest, NeedsAnInputThatIsThere) {
 
 // ---- a flag ----
 
-// A flag from 20 to 30 mm, of which the edge at 20 mm counts on the way to max.
-config::AxisConfig flagAxis(HomingKind kind = HomingKind::kFlag) {
-  config::AxisConfig config = homingAxis();
-  config.homing->kind = kind;
-  config.homing->at_max = true;
-  config.homing->input = "flag";
-  config.homing->pull_off = 0.0;
-  return config;
-}
-
-class HomingToFlagTest : public HomingKinds {
- protected:
-  struct Rig {
-    double start = 0.0;  // [mm]
-    double hysteresis = 0.0;
-    int bounces = 0;
-    bool has_flag = true;
-  };
-
-  void buildFlag(const config::AxisConfig& config, const Rig& rig) {
-    config::InputConfig flag = inputOf("flag");
-    flag.debounce_ns = 2'000'000;
-    build(config, {flag, inputOf("index")}, [&](sim::RigAxisSpec& spec) {
-      spec.start = rig.start;
-      sim::SwitchSpec contact;
-      contact.line = "io.flag";
-      contact.active_level = true;
-      contact.position = 20.0;
-      contact.end = 30.0;
-      contact.hysteresis = rig.hysteresis;
-      contact.bounces = rig.bounces;
-      contact.bounce_ns = 200'000;
-      if (rig.has_flag) spec.flags.push_back(contact);
-      // A turn of 40 mm: at -15 mm, 25 mm and 65 mm.
-      contact = sim::SwitchSpec{};
-      contact.line = "io.index";
-      contact.active_level = true;
-      contact.position = index_at;
-      contact.end = index_at + 0.1;
-      contact.every = 40.0;
-      spec.flags.push_back(contact);
-    });
-  }
-
-  /// Expects the axis homed. @return [steps] see errorOf()
-  double homed(double trigger, const std::string& what) {
-    const HomingResult result = x().home();
-    EXPECT_EQ(result.end, HomingEnd::kHomed) << what << ": " << result.message;
-    EXPECT_EQ(violationsOf(bench->report()), "") << what;
-    return errorOf(trigger);
-  }
-
-  /// A homing whose flag is missing, or doesn't change, must fail and name it.
-  /// @param active what it always tells; empty: it isn't there
-  void expectNamed(const config::AxisConfig& config, Rig rig, std::optional<bool> active) {
-    rig.has_flag = active.has_value();
-    buildFlag(config, rig);
-    if (active) bench->rig.stickInput("flag", *active, bench->clock.now());
-    const HomingResult result = x().home();
-    const std::string what = active ? *active ? "active" : "inactive" : "missing";
-    EXPECT_EQ(result.end, HomingEnd::kFailed) << what << " from " << rig.start;
-    EXPECT_NE(result.message.find("the input flag didn't become"), std::string::npos)
-        << what << " from " << rig.start << ": " << result.message;
-    EXPECT_FALSE(x().state().homed);
-    EXPECT_EQ(violationsOf(bench->report()), "") << what;
-  }
-
-  /// The spread of the home position over random starts, with random bounces and hysteresis of the
-  /// flag. Some of the starts are with a flag that is missing or stuck.
-  /// @return [steps] by how much
-  double spreadOf(const config::AxisConfig& config, double trigger) {
-    std::mt19937 random(7);
-    std::uniform_real_distribution<double> starts(-99.0, 99.0);
-    std::uniform_real_distribution<double> hysteresis(0.0, 0.8);
-    const std::array<std::optional<bool>, 3> troubles{std::nullopt, true, false};
-    double least = 1e9;
-    double most = -1e9;
-    for (std::size_t i = 0; i < 1000; ++i) {
-      Rig rig;
-      rig.start = std::round(starts(random) * 80.0) / 80.0;
-      if (i == 1) rig.start = 100.0;  // on the endstop ahead
-      rig.hysteresis = hysteresis(random);
-      rig.bounces = static_cast<int>(random() % 7);
-      if (i % 20 == 19) {
-        expectNamed(config, rig, troubles[i / 20 % troubles.size()]);
-        if (HasFailure()) return 0.0;
-        continue;
-      }
-      buildFlag(config, rig);
-      const double error = homed(trigger, "from " + std::to_string(rig.start));
-      if (HasFailure()) return 0.0;
-      least = std::min(least, error);
-      most = std::max(most, error);
-    }
-    RecordProperty("spread_in_thousandths_of_a_step", static_cast<int>(1e3 * (most - least)));
-    EXPECT_NEAR(most, 0.0, 1.0);
-    return most - least;
-  }
-
-  double index_at = 25.0;  // [mm]
-};
+class HomingToFlagTest : public HomingKindsTest {};
 
 TEST_F(HomingToFlagTest, TakesTheEdgeFromTheSameSideWhereverItStarts) {
   for (const double start : {-99.0, 0.0, 20.0, 25.0, 30.0, 35.0, 99.0, 100.0}) {
@@ -384,15 +237,10 @@ TEST_F(HomingToFlagTest, TakesTheEdgeFromTheSameSideWhereverItStarts) {
   }
 }
 
-TEST_F(HomingToFlagTest, FromAnyPlaceFindsTheSameOne) {
-  EXPECT_LE(spreadOf(flagAxis(), 0.02), 1.0);
-}
-
 TEST_F(HomingToFlagTest, FindsTheMiddleWhateverTheHysteresis) {
-  // The switch opens 0.3 mm beyond each edge.
-  EXPECT_LE(spreadOf(flagAxis(HomingKind::kFlagCentre), 0.025), 1.0);
   buildFlag(flagAxis(HomingKind::kFlagCentre), {});
   const double without = homed(0.025, "without");
+  // The switch opens 2 mm beyond each edge.
   buildFlag(flagAxis(HomingKind::kFlagCentre), {0.0, 2.0});
   EXPECT_NEAR(homed(0.025, "with"), without, 1e-6);
 }
@@ -407,17 +255,10 @@ TEST_F(HomingToFlagTest, AFlagOnARotaryAxisNeedsNoEndstop) {
   EXPECT_EQ(result.message,
             "x isn't homed: the input flag didn't become active within max_travel, 0.3 m; it "
             "stands at 0.3 m");
-  std::vector<sim::RigAxisSpec> specs;
-  build(config, {inputOf("flag")}, [](sim::RigAxisSpec& spec) {
-    spec.start = 50.0;
-    sim::SwitchSpec contact;
-    contact.line = "io.flag";
-    contact.active_level = true;
-    contact.position = 20.0;
-    contact.end = 30.0;
-    contact.every = 100.0;  // a turn
-    spec.flags.push_back(contact);
-  });
+  Rig turning;
+  turning.start = 50.0;
+  turning.flag_every = 100.0;
+  buildFlag(config, turning);
   EXPECT_NEAR(homed(0.12, "turning"), 0.5, 0.51);
 }
 
@@ -471,6 +312,37 @@ TEST_F(HomingToFlagTest, TheTimeoutNamesTheFlag) {
             std::string::npos);
 }
 
+TEST_F(HomingToFlagTest, TheTimeoutOfTheMiddleNamesTheFlagInEachPhase) {
+  struct Case {
+    double timeout;  // [s]
+    const char* words;
+  };
+  for (const Case& each :
+       {Case{0.2, "the input flag didn't become active within timeout_s, 0.2 s; it stands at 0.01"},
+        Case{0.8, "the input flag didn't become active again within timeout_s, 0.8 s"},
+        Case{1.0,
+             "the input flag didn't become inactive within timeout_s, 1 s; it stands at 0.020"},
+        Case{3.2,
+             "the input flag didn't become inactive within timeout_s, 3.2 s; it stands at "
+             "0.028"}}) {
+    config::AxisConfig config = flagAxis(HomingKind::kFlagCentre);
+    config.homing->timeout = each.timeout;
+    buildFlag(config, {});
+    expectFails(each.words, std::to_string(each.timeout));
+  }
+}
+
+TEST_F(HomingToFlagTest, SaysThatTheFlagBouncesWithoutEnd) {
+  bounce_ns = 700'000;
+  for (const config::AxisConfig& config :
+       {flagAxis(), flagAxis(HomingKind::kFlagCentre), indexAxis("flag")}) {
+    buildFlag(config, {0.0, 0.0, 1'000'000});
+    expectFails(
+        "x isn't homed: the input flag bounces without end: after 100 ms it still hasn't been at "
+        "rest for debounce_ms, 2 ms");
+  }
+}
+
 TEST_F(HomingToFlagTest, IsHeldAtAnyMomentAndFindsTheSamePlace) {
   buildFlag(flagAxis(), {});
   const double undisturbed = homed(0.02, "undisturbed");
@@ -517,14 +389,8 @@ TEST_F(HomingToFlagTest, EndsWithAStopADisableAndAnEmergencyStopInAnyPhase) {
 TEST_F(HomingToFlagTest, KnowsThePlaceOfTheJointWithABacklash) {
   config::AxisConfig config = flagAxis();
   config.backlash = 0.001;
-  build(config, {inputOf("flag")}, [](sim::RigAxisSpec& spec) {
-    sim::SwitchSpec contact;
-    contact.line = "io.flag";
-    contact.active_level = true;
-    contact.position = 20.0;
-    contact.end = 30.0;
-    spec.flags.push_back(contact);
-  });
+  build(config, {inputNamed("flag")},
+        [](sim::RigAxisSpec& spec) { spec.flags.push_back(flagOf("flag", 20.0, 30.0)); });
   // The rig has no backlash: on the way to max the joint is a whole one behind.
   const HomingResult result = x().home();
   EXPECT_EQ(result.end, HomingEnd::kHomed) << result.message;
@@ -560,14 +426,9 @@ struct ForgetfulHoming {
 ForgetfulHoming homeForgetful(HomingKind kind, const std::function<bool(int)>& loses) {
   const config::AxisConfig config = flagAxis(kind);
   std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
-  sim::SwitchSpec contact;
-  contact.line = "io.flag";
-  contact.active_level = true;
-  contact.position = 20.0;
-  contact.end = 30.0;
-  specs[0].flags.push_back(contact);
+  specs[0].flags.push_back(flagOf("flag", 20.0, 30.0));
   machine::MachineOptions options;
-  options.inputs = {inputOf("flag")};
+  options.inputs = {inputNamed("flag")};
   ForgetfulRig rig(specs, nullptr, {}, {}, Bench::ioOf(options));
   rig.forget(loses);
   pulse::VirtualClock clock;
@@ -615,20 +476,14 @@ TEST_F(HomingToFlagTest, FailsIfTheKernelReportsNoEdgeOfTheFlag) {
 // ---- an index ----
 
 TEST_F(HomingToFlagTest, TakesTheIndexAfterTheFlag) {
-  config::AxisConfig config = flagAxis(HomingKind::kIndex);
-  config.homing->input = "index";
-  config.homing->flag = "flag";
-  config.steps_per_round = 3200.0;  // 40 mm
-  index_at = 38.0;                  // 18 mm from the flag's edge
-  EXPECT_LE(spreadOf(config, 0.038), 1.0);
+  index_at = 38.0;  // 18 mm from the flag's edge
+  buildFlag(indexAxis("flag"), {});
+  EXPECT_NEAR(homed(0.038, "after the flag"), 0.5, 0.51);
   EXPECT_EQ(x().home().message.find("may be taken"), std::string::npos);
 }
 
 TEST_F(HomingToFlagTest, WarnsIfTheIndexIsNearTheFlagsEdge) {
-  config::AxisConfig config = flagAxis(HomingKind::kIndex);
-  config.homing->input = "index";
-  config.homing->flag = "flag";
-  config.steps_per_round = 3200.0;
+  const config::AxisConfig config = indexAxis("flag");
   index_at = 22.0;
   buildFlag(config, {});
   HomingResult result = x().home();
@@ -645,10 +500,7 @@ TEST_F(HomingToFlagTest, WarnsIfTheIndexIsNearTheFlagsEdge) {
 }
 
 TEST_F(HomingToFlagTest, SaysThatNoIndexComesWithinATurn) {
-  config::AxisConfig config = flagAxis(HomingKind::kIndex);
-  config.homing->input = "index";
-  config.homing->flag = "flag";
-  config.steps_per_round = 3200.0;
+  const config::AxisConfig config = indexAxis("flag");
   buildFlag(config, {});
   bench->rig.stickInput("index", false, bench->clock.now());
   const HomingResult result = x().home();
@@ -659,9 +511,7 @@ TEST_F(HomingToFlagTest, SaysThatNoIndexComesWithinATurn) {
 }
 
 TEST_F(HomingToFlagTest, AnIndexAloneIsTheNextOne) {
-  config::AxisConfig config = flagAxis(HomingKind::kIndex);
-  config.homing->input = "index";
-  config.steps_per_round = 3200.0;
+  const config::AxisConfig config = indexAxis();
   for (const double start : {-14.0, 0.0, 24.9, 25.0, 25.1}) {
     buildFlag(config, {start});
     EXPECT_NEAR(homed(0.025, std::to_string(start)), 0.5, 0.51) << start;
@@ -670,9 +520,44 @@ TEST_F(HomingToFlagTest, AnIndexAloneIsTheNextOne) {
   EXPECT_NEAR(homed(0.065, "26"), 0.5, 0.51);
 }
 
+TEST_F(HomingToFlagTest, TheTimeoutNamesTheIndex) {
+  for (const std::string flag : {"flag", ""}) {
+    config::AxisConfig config = indexAxis(flag);
+    config.homing->timeout = flag.empty() ? 1.0 : 3.0;
+    index_at = 38.0;
+    buildFlag(config, {});
+    expectFails("x isn't homed: the index index didn't come within timeout_s", flag);
+  }
+}
+
+TEST_F(HomingToFlagTest, SaysThatAnIndexAloneDoesNotComeWithinTheTravel) {
+  config::AxisConfig config = indexAxis();
+  config.homing->max_travel = 0.02;  // it is 25 mm away
+  buildFlag(config, {});
+  expectFails("x isn't homed: the index index didn't come within max_travel, 0.02 m; it stands at");
+  EXPECT_EQ(bench->pulses(), 1600);
+}
+
+TEST_F(HomingToFlagTest, SaysThatAnIndexIsStuckActive) {
+  const auto expectStuck = [this](const config::AxisConfig& config, const std::string& words) {
+    buildFlag(config, {});
+    bench->rig.stickInput("index", true, bench->clock.now());
+    expectFails(words);
+  };
+  config::AxisConfig alone = indexAxis();
+  expectStuck(alone,
+              "the min endstop was met while leaving: the input index didn't become inactive");
+  alone.homing->max_travel = 0.02;
+  expectStuck(alone, "the input index didn't become inactive within max_travel, 0.02 m");
+  alone.homing->timeout = 0.2;
+  expectStuck(alone, "the input index didn't become inactive within timeout_s, 0.2 s");
+  expectStuck(indexAxis("flag"),
+              "the index index didn't come within a turn of the edge of the input flag");
+}
+
 // ---- the final position ----
 
-TEST_F(HomingKinds, StandsAtTheFinalPositionWithANumberOfItsOwn) {
+TEST_F(HomingKindsTest, StandsAtTheFinalPositionWithANumberOfItsOwn) {
   config::AxisConfig config = homingAxis();
   config.homing->final_position = 0.03;
   build(config, {}, [](sim::RigAxisSpec& /*spec*/) {});
@@ -684,7 +569,7 @@ TEST_F(HomingKinds, StandsAtTheFinalPositionWithANumberOfItsOwn) {
 
 // ---- where it stands ----
 
-TEST_F(HomingKinds, ADirectHomingMakesNoStep) {
+TEST_F(HomingKindsTest, ADirectHomingMakesNoStep) {
   config::AxisConfig config = homingAxis();
   config.homing = config::HomingConfig{};
   config.homing->kind = HomingKind::kDirect;
@@ -704,7 +589,7 @@ TEST_F(HomingKinds, ADirectHomingMakesNoStep) {
   EXPECT_NEAR(carriage(), 0.02, kStep);
 }
 
-TEST_F(HomingKinds, ADirectHomingIsRefusedWhileTheAxisIsDisabled) {
+TEST_F(HomingKindsTest, ADirectHomingIsRefusedWhileTheAxisIsDisabled) {
   config::AxisConfig config = homingAxis();
   config.homing = config::HomingConfig{};
   config.homing->kind = HomingKind::kDirect;

@@ -233,7 +233,82 @@ TEST_F(SharedSwitches, RandomMotionsPassNoEnd) {
   }
 }
 
+// From the end itself it can't begin: nobody knows then which of the two it is.
+TEST_F(SharedSwitches, RandomHomingsFindTheirEndOrNameTheCause) {
+  std::mt19937 random(37);
+  std::uniform_real_distribution<double> starts(-100.2, 100.2);
+  std::uniform_real_distribution<double> hysteresis(0.0, 0.8);
+  enum class Trouble { kNone, kMissing, kStuckInactive, kStuckActive };
+  test::Spread spread;
+  int refused = 0;
+  for (int i = 0; i < 300; ++i) {
+    config::AxisConfig config = sharedEnds();
+    config.homing->at_max = i % 2 != 0;
+    const double end = config.homing->at_max ? 0.1 : -0.1;
+    const Trouble trouble = i % 20 < 17 ? Trouble::kNone : static_cast<Trouble>(i % 20 - 16);
+    const double start = i % 20 == 5 ? std::copysign(100.1, starts(random))
+                                     : std::round(starts(random) * 80.0) / 80.0;
+    build({config}, [&](sim::RigAxisSpec& spec) {
+      spec.start = start;
+      for (auto* contact : {&spec.min_switch, &spec.max_switch}) {
+        (*contact)->hysteresis = hysteresis(random);
+        (*contact)->bounces = static_cast<int>(random() % 7);
+        (*contact)->bounce_ns = 200'000;
+        if (trouble == Trouble::kMissing) contact->reset();
+      }
+    });
+    sim::RigFaults faults;
+    if (trouble == Trouble::kStuckInactive) faults.min_stuck = faults.max_stuck = false;
+    if (trouble == Trouble::kStuckActive) faults.min_stuck = faults.max_stuck = true;
+    bench->rig.setFaults("x", faults);
+    SCOPED_TRACE("homing " + std::to_string(i) + " from " + std::to_string(start));
+    const bool is_dead = trouble == Trouble::kMissing || trouble == Trouble::kStuckInactive;
+    if (trouble == Trouble::kStuckActive || (!is_dead && std::abs(start) >= 100.0)) {
+      EXPECT_REFUSED(x().home(), kUnknown);
+      EXPECT_EQ(bench->pulses(), 0);
+      ++refused;
+    } else if (is_dead) {
+      const HomingResult result = x().home();
+      EXPECT_EQ(result.end, HomingEnd::kFailed);
+      const std::string which = config.homing->at_max ? "max" : "min";
+      EXPECT_NE(result.message.find("the " + which + " switch didn't close within max_travel"),
+                std::string::npos)
+          << result.message;
+    } else {
+      expectHomed(x().home(), end);
+      const double beyond = x().state().position - config.homing->offset - (carriage() - end);
+      spread.add(std::copysign(1.0, end) * beyond / kStep);
+    }
+    if (HasFailure()) return;
+  }
+  spread.expectAStep();
+  EXPECT_GE(refused, 30);
+}
+
 // ---- switches of several axes ----
+
+TEST_F(SharedSwitches, RandomHomingsOfSeveralAxesFindTheirPlaces) {
+  std::mt19937 random(37);
+  std::uniform_real_distribution<double> starts(-99.9, 99.0);
+  test::Spread spread;
+  for (int i = 0; i < 100; ++i) {
+    const std::vector<config::AxisConfig> configs{sharedMin("x", i % 2), sharedMin("y", 1 - i % 2)};
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(configs);
+    for (sim::RigAxisSpec& spec : specs) {
+      spec.start = std::round(starts(random) * 80.0) / 80.0;
+      spec.min_switch->bounces = static_cast<int>(random() % 7);
+      spec.min_switch->bounce_ns = 200'000;
+    }
+    bench = std::make_unique<Bench>(configs, specs);
+    SCOPED_TRACE("homing " + std::to_string(i));
+    for (const HomingResult& result : bench->machine->home()) {
+      expectHomed(result, -0.1);
+      spread.add((result.position - carriage(result.axis)) / kStep);
+    }
+    if (HasFailure()) return;
+  }
+  spread.expectAStep();
+}
 
 TEST_F(SharedSwitches, AxesAreHomedOneAfterTheOther) {
   config::AxisConfig z = sharedMin("z", 2);

@@ -159,6 +159,26 @@ TEST(ReadKinematics, RefusesAHomingThatWouldCostTheOtherAxisItsPosition) {
       << lines[0];
 }
 
+// The index of a motor of a CoreXY comes at a place of x that depends on where y is.
+TEST(ReadKinematics, RefusesAHomingToAnIndexOfAMotorThatTheOtherAxisTurnsToo) {
+  ConfigValue tree = coreXy();
+  put(tree, "axes/x/steps_per_round", 3200);
+  put(tree, "axes/x/homing",
+      mapOf({{"kind", "flag"},
+             {"towards", "max"},
+             {"input", "home"},
+             {"seek_speed_mm_s", 10.0},
+             {"latch_speed_mm_s", 1.0},
+             {"max_travel_mm", 100.0}}));
+  Lines lines;
+  read(tree, lines);
+  EXPECT_EQ(lines, Lines{});
+  put(tree, "axes/x/homing/kind", std::string("index"));
+  read(tree, lines);
+  EXPECT_EQ(lines, (Lines{"/kinematics/axes: has x, whose homing/kind must not be index: an index "
+                          "comes once a turn of a motor, which the other axes turn too"}));
+}
+
 TEST(ReadKinematics, RefusesTopSpeedsThatADriverCantStepTogether) {
   ConfigValue tree = coreXy();
   for (const std::string axis : {"x", "y"}) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,6 +27,27 @@ inline config::AxisConfig homingAxis(const std::string& name = "x") {
   config.homing = homing;
   return config;
 }
+
+/// How far apart the home positions of several homings are.
+class Spread {
+ public:
+  /// @param error [steps] how far a home position is from where it should be
+  void add(double error) {
+    least_ = std::min(least_, error);
+    most_ = std::max(most_, error);
+  }
+  /// Expects at most a step from the first to the last, and the last within a step.
+  void expectAStep() const {
+    EXPECT_LE(most_ - least_, 1.0) << least_ << " to " << most_;
+    EXPECT_NEAR(most_, 0.0, 1.0);
+    testing::Test::RecordProperty("spread_in_thousandths_of_a_step",
+                                  static_cast<int>(1e3 * (most_ - least_)));
+  }
+
+ private:
+  double least_ = std::numeric_limits<double>::infinity();
+  double most_ = -std::numeric_limits<double>::infinity();
+};
 
 class HomingTest : public testing::Test {
  protected:
