@@ -70,6 +70,7 @@ class GantryHomingKinds : public test::GantryTest {
       const HomingResult result = y().home();
       ASSERT_EQ(result.end, HomingEnd::kHomed)
           << start << ", racked by " << racked << ": " << result.message;
+      ASSERT_EQ(y().state().fault, "") << start;
       ASSERT_LE(std::abs(skew() - racked), 1.001e3 * kStep * config.homing->approaches) << start;
       expectNoViolations();
       spread.add(
@@ -119,6 +120,26 @@ TEST_F(GantryHomingKinds, ToABlockEndsAtTheFirstMotorThatMeetsIt) {
         },
         -0.08, [this] { return skew() < 0.0 ? right() : left(); });
   }
+}
+
+TEST_F(GantryHomingKinds, ToABlockAreReportedByTheFaultOutputOfEitherMotor) {
+  config::AxisConfig config = gantryWith(test::blockAxis(2));
+  config.homing->input = "";
+  test::giveDrivers(config, driver::driverChip("drv8825"));
+  config.endstop_min.reset();
+  config.twins[0].endstop_min.reset();
+  config.fault = config::FaultPin{"left.fault"};
+  config.twins[0].fault = config::FaultPin{"right.fault"};
+  homeFromRandomPlaces(
+      config, -77.0,
+      [&config](auto& left, auto& right) {
+        for (auto* motor : {&left, &right}) {
+          motor->block_min = -80.0;
+          motor->stall_line = motor->fault_line;
+          motor->stall_active = *config.driver.fault_active;
+        }
+      },
+      -0.08, [this] { return skew() < 0.0 ? right() : left(); });
 }
 
 // ---- axes that share their motors ----
