@@ -18,6 +18,7 @@ using config::HomingKind;
 using test::blockAxis;
 using test::flagAxis;
 using test::indexAxis;
+using test::kStep;
 using test::Spread;
 
 constexpr int kMostBounces = 6;  // 2.4 ms, longer than the debounce time
@@ -104,6 +105,10 @@ TEST_F(RandomHomings, ToABlockFindTheSameOneOrSayWhatIsWrongWithItsReport) {
       ASSERT_EQ(bench->pulses(), 0) << what;
     } else {
       spread.add(homed(-0.08, what));
+      // The block has stopped the step that reports it, or none if a contact does.
+      const double lost =
+          (carriage() - rig.start / 1e3) / kStep - static_cast<double>(bench->pulses());
+      ASSERT_NEAR(lost, rig.bounces > 0 ? 0.0 : 1.0 + i % 2, 1e-6) << what;
     }
     if (HasFailure()) return;
   }
