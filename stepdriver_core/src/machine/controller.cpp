@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "activity/driver_activities.h"
+#include "axis/line_failure.h"
 #include "message_text.h"
 #include "nanoseconds.h"
 #include "stepdriver_core/error.h"
@@ -271,19 +272,12 @@ void Controller::on(const EngineHangs& hang) {
 }
 
 std::string Controller::textOf(const pulse::LineFailure& failure) const {
-  const auto has = [&failure](const auto& axis) {
-    const motor::MotorLines& all = axis->motor.lines();
-    for (std::size_t i = 0; i < all.motors(); ++i) {
-      const motor::ChipLines& own = all.motorAt(i);
-      const bool has_it =
-          failure.input ? own.endstop_min == failure.line || own.endstop_max == failure.line ||
-                              own.fault == failure.line || own.in_position == failure.line
-                        : own.step == failure.line || own.dir == failure.line;
-      if (has_it) return true;
-    }
-    return false;
-  };
-  const auto owner = std::find_if(context_.axes.begin(), context_.axes.end(), has);
+  const std::string of_output =
+      failure.input ? "" : requests_.named.outputs.failureText(failure, context_.lines);
+  if (!of_output.empty()) return of_output;
+  const auto owner = std::find_if(
+      context_.axes.begin(), context_.axes.end(),
+      [&failure](const auto& axis) { return axis::isLineOf(failure, axis->motor.lines()); });
   if (owner == context_.axes.end()) return context_.axes.front()->failureText(failure);
   return (*owner)->config.name + ": " + (*owner)->failureText(failure);
 }

@@ -189,14 +189,18 @@ void NamedOutput::noteWritten(const pulse::WrittenOutput& written) {
 std::string NamedOutput::failed(int error, activity::Context& context) {
   certain_ = false;
   gave_up_ = false;
-  state_.error = fmt::format(
-      "the line {} of the output {} can't be written: {}; check the cable and the supply of its "
-      "chip",
-      context.lines.output(line_), config_.name, gpio::errorText(error));
+  state_.error = failureText(error, context.lines);
   for (const SharedCall& call : std::exchange(calls_, {})) {
     call->fail({Failure::Kind::kGpio, state_.error});
   }
   return state_.error;
+}
+
+std::string NamedOutput::failureText(int error, const axis::LineNames& names) const {
+  return fmt::format(
+      "the line {} of the output {} can't be written: {}; check the cable and the supply of its "
+      "chip",
+      names.output(line_), config_.name, gpio::errorText(error));
 }
 
 void NamedOutput::refuseCalls(const std::string& why) {
@@ -262,6 +266,14 @@ std::string NamedOutputs::poll(activity::Context& context, const std::string& wh
     if (failure.empty()) failure = own;
   }
   return failure;
+}
+
+std::string NamedOutputs::failureText(const pulse::LineFailure& failure,
+                                      const axis::LineNames& names) const {
+  const auto found = std::find_if(outputs_.begin(), outputs_.end(), [&](const NamedOutput& output) {
+    return output.line() == failure.line;
+  });
+  return found != outputs_.end() ? found->failureText(failure.error, names) : "";
 }
 
 pulse::Nanoseconds NamedOutputs::due() const {

@@ -45,6 +45,10 @@ class NamedOutput {
   /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const;
   bool isBeingWritten() const { return job_.has_value(); }
+  /// By its index in the request.
+  int line() const { return line_; }
+  /// @param error errno of a write of its line.
+  std::string failureText(int error, const axis::LineNames& names) const;
 
  private:
   struct Job {
@@ -110,6 +114,8 @@ class NamedOutputs {
   std::string poll(activity::Context& context, const std::string& why_safe);
   pulse::Nanoseconds due() const;
   bool areBeingWritten() const;
+  /// Empty: it is no line of them. @param failure of the line of an output.
+  std::string failureText(const pulse::LineFailure& failure, const axis::LineNames& names) const;
   std::vector<OutputState> states() const;
   std::vector<config::OutputConfig> configs() const;
   bool empty() const { return outputs_.empty(); }
