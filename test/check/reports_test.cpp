@@ -169,6 +169,28 @@ TEST(LinesOf, AnAxisAreAllThatAreWired) {
   EXPECT_EQ(pins, "emergency_stop=T motor_power=P motor_power/feedback=Q heartbeat=H ");
 }
 
+TEST(LinesReport, HasOutputsAndInputsWithAName) {
+  machine::MachineOptions options;
+  options.outputs.resize(1);
+  options.outputs[0].name = "pen";
+  options.outputs[0].line = "GPIO1";
+  options.inputs.resize(2);
+  options.inputs[0].name = "probe";
+  options.inputs[0].line.line = "gpiochip0:2";
+  options.inputs[1].name = "button";
+  options.inputs[1].line.line = "GPIO17";
+  const LinesReport report = linesReport(twoChips(), linesOf({}, options));
+  EXPECT_EQ(report.missing, 2U);
+  EXPECT_EQ(report.text.rfind("  pin            line         found at     state\n"
+                              "  outputs/pen    GPIO1        gpiochip0:1  free\n"
+                              "  inputs/probe   gpiochip0:2  gpiochip0:2  held by \"gpioset\"\n"
+                              "  inputs/button  GPIO17       not found\n",
+                              0),
+            0U)
+      << report.text;
+  EXPECT_TRUE(has(report.text, "  GPIO17: no chip has a line of that name.")) << report.text;
+}
+
 SystemFacts facts() {
   SystemFacts facts;
   facts.user = "me";

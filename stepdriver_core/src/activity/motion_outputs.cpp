@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "compare_plan.h"
+#include "config/least_time.h"
 #include "context.h"
 #include "message_text.h"
 #include "profile/resting_count.h"
@@ -263,7 +264,7 @@ pulse::Nanoseconds MotionOutputs::mayBegin(const motion::PathMarks& marks) const
     if (own.marks.empty() || own.marks.front().setting.on == last.setting.on) continue;
     const motion::Mark& first = own.marks.front();
     const pulse::Nanoseconds free =
-        last.switched + (last.setting.on ? output.config.min_on_ns : output.config.min_off_ns);
+        last.switched + config::leastTime(output.config, last.setting.on).ns;
     const pulse::Nanoseconds after = std::max<std::int64_t>(0, first.place_ns - own.lead(first));
     earliest = std::max(earliest, free - after);
   }

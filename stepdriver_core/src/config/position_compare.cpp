@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "config/bounds.h"
+#include "config/least_time.h"
 #include "message_text.h"
 
 namespace stepdriver::config {
@@ -30,7 +31,11 @@ std::string secondsOf(std::int64_t ns) { return secondsText(static_cast<double>(
 class CompareCheck {
  public:
   CompareCheck(const PositionCompare& compare, const OutputConfig& output, const AxisConfig& axis)
-      : compare_(compare), output_(output), axis_(axis) {}
+      : compare_(compare),
+        output_(output),
+        axis_(axis),
+        least_on_(leastTime(output, true)),
+        least_off_(leastTime(output, false)) {}
 
   std::string why() {
     checkKinds();
@@ -46,6 +51,10 @@ class CompareCheck {
   }
   std::string show(double place) const {
     return fmt::format("{} {}", numberText(place), unitOf(axis_.kind));
+  }
+
+  static std::string textOf(const LeastTime& least) {
+    return fmt::format("{} of it is", least.name);
   }
 
   void checkKinds() {
@@ -70,9 +79,9 @@ class CompareCheck {
     check("lead of off", compare_.lead_off_ns, 0);
     if (!compare_.cams.empty()) return;
     check("pulse", compare_.pulse_ns, kShortestPulse);
-    if (compare_.pulse_ns < output_.min_on_ns) {
-      refuse("has a pulse of {}, but min_on_ms of it is {}", secondsOf(compare_.pulse_ns),
-             secondsOf(output_.min_on_ns));
+    if (compare_.pulse_ns < least_on_.ns) {
+      refuse("has a pulse of {}, but {} of it is {}", secondsOf(compare_.pulse_ns), least_on_.name,
+             secondsOf(least_on_.ns));
     }
     if (output_.max_on_ns && compare_.pulse_ns > *output_.max_on_ns) {
       refuse("has a pulse of {}, but max_on_s of it is {}", secondsOf(compare_.pulse_ns),
@@ -90,7 +99,7 @@ class CompareCheck {
   }
 
   // The least way between two actions, and the time that the axis takes for it at its top speed.
-  void checkWay(const char* between, double way, std::int64_t needed, const char* why) {
+  void checkWay(const char* between, double way, std::int64_t needed, const std::string& why) {
     const std::string way_text = roughText(way) + " " + unitOf(axis_.kind);
     if (way * axis_.steps_per_unit * kSlack < 1.0) {
       refuse("has {} of {}, but a step of {} is {}", between, way_text, axis_.name,
@@ -135,8 +144,8 @@ class CompareCheck {
     }
     if (!std::isfinite(least)) return;
     const char* const between = "a distance between pulses";
-    checkWay(between, least, compare_.pulse_ns + std::max<std::int64_t>(output_.min_off_ns, 1),
-             "a pulse and min_off_ms of it are");
+    checkWay(between, least, compare_.pulse_ns + std::max<std::int64_t>(least_off_.ns, 1),
+             fmt::format("a pulse and {} of it are", least_off_.name));
     checkLead(between, least, compare_.lead_on_ns);
   }
 
@@ -150,7 +159,7 @@ class CompareCheck {
       checkPlace(cam.from);
       checkPlace(cam.to);
       if (cam.from > cam.to) refuse("has a cam from {} to {}", show(cam.from), show(cam.to));
-      checkWay("a cam", cam.to - cam.from, output_.min_on_ns, "min_on_ms of it is");
+      checkWay("a cam", cam.to - cam.from, least_on_.ns, textOf(least_on_));
       checkLead("a cam", cam.to - cam.from, longest_lead);
     }
     if (!why_.empty()) return;
@@ -164,7 +173,7 @@ class CompareCheck {
       }
       // The last place of one and the first place of the next one are a step nearer.
       const double off = gap - 1.0 / axis_.steps_per_unit;
-      checkWay("a gap between cams", off, output_.min_off_ns, "min_off_ms of it is");
+      checkWay("a gap between cams", off, least_off_.ns, textOf(least_off_));
       checkLead("a gap between cams", off, longest_lead);
     }
   }
@@ -172,6 +181,8 @@ class CompareCheck {
   const PositionCompare& compare_;
   const OutputConfig& output_;
   const AxisConfig& axis_;
+  const LeastTime least_on_;
+  const LeastTime least_off_;
   std::string why_;
 };
 

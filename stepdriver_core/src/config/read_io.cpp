@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "config/least_time.h"
 #include "config/position_compare.h"
 #include "config/read_axes.h"
 #include "config/write_axes.h"
@@ -57,8 +58,14 @@ void checkMostOn(ConfigReader& reader, const OutputConfig& output) {
                                            reader.fullName(other), reader.shown(other), why));
   };
   if (output.at_fault) refuse("at_fault", "in its safe state the output is on for any time");
+  constexpr const char* kTooLong = "the output can't stay on for longer than it may";
+  const LeastTime least = leastTime(output, true);
   if (output.min_on_ns > *output.max_on_ns) {
-    refuse("min_on_ms", "the output can't stay on for longer than it may");
+    refuse("min_on_ms", kTooLong);
+  } else if (least.ns > *output.max_on_ns) {
+    reader.contradiction(kKey,
+                         fmt::format("is {}, but {} is {} s: {}", reader.shown(kKey), least.name,
+                                     numberText(static_cast<double>(least.ns) / 1e9), kTooLong));
   }
 }
 

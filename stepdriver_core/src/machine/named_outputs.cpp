@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "config/least_time.h"
 #include "gpio/chip_table.h"
 #include "message_text.h"
 #include "printable.h"
@@ -144,7 +145,7 @@ bool NamedOutput::mustGoOff(pulse::Nanoseconds now) const {
 
 pulse::Nanoseconds NamedOutput::mayChange() const {
   if (!certain_ || !state_.changed || written_.setting.on == wanted_.on) return 0;
-  return written_.switched + (state_.on ? config_.min_on_ns : config_.min_off_ns);
+  return written_.switched + config::leastTime(config_, state_.on).ns;
 }
 
 void NamedOutput::write(activity::Context& context, bool safe) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "config/least_time.h"
 #include "motor/input_shaping.h"
 #include "nanoseconds.h"
 #include "pulse/measure.h"
@@ -98,7 +99,8 @@ std::vector<pulse::OutputLine> Wiring::switchedOutputs(const MachineOptions& opt
   std::vector<pulse::OutputLine> switched;
   for (std::size_t i = 0; i < options.outputs.size(); ++i) {
     const config::OutputConfig& output = options.outputs[i];
-    switched.push_back({named_outputs[i], output.active_level, output.min_on_ns, output.min_off_ns,
+    switched.push_back({named_outputs[i], output.active_level, config::leastTime(output, true).ns,
+                        config::leastTime(output, false).ns,
                         output.max_on_ns.value_or(pulse::kNever),
                         nanoseconds(options.write_timeout)});
   }

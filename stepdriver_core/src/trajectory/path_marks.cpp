@@ -63,7 +63,7 @@ std::string textOf(const PathMark& mark) {
 }
 
 std::string secondsText(std::int64_t ns) {
-  return numberText(static_cast<double>(ns) * 1e-9) + " s";
+  return numberText(static_cast<double>(ns) / 1e9) + " s";
 }
 
 }  // namespace
@@ -73,8 +73,9 @@ std::vector<PathOutput> pathOutputs(const std::vector<config::OutputConfig>& out
   std::vector<PathOutput> known;
   known.reserve(outputs.size());
   for (const config::OutputConfig& output : outputs) {
-    known.push_back({output.name, pwmLineOf(output.line).has_value(), output.min_on_ns,
-                     output.min_off_ns, output.max_on_ns});
+    known.push_back({output.name, pwmLineOf(output.line).has_value(),
+                     config::leastTime(output, true), config::leastTime(output, false),
+                     output.max_on_ns});
   }
   for (const OutputLead& lead : leads) {
     const auto found = std::find_if(known.begin(), known.end(), [&](const PathOutput& output) {
@@ -143,14 +144,13 @@ void requireRates(const std::vector<PathMark>& marks, const std::vector<PathOutp
     if (before.mark != nullptr && before.mark->setting.on == mark.setting.on) continue;
     if (before.mark != nullptr) {
       const std::int64_t since = time_ns - before.time_ns;
-      const std::int64_t least =
-          std::max<std::int64_t>(1, mark.setting.on ? output.min_off_ns : output.min_on_ns);
-      if (since < least) {
+      const config::LeastTime& least = mark.setting.on ? output.least_off : output.least_on;
+      const std::int64_t least_ns = std::max<std::int64_t>(1, least.ns);
+      if (since < least_ns) {
         throw Refused(fmt::format(
             "{} switches the output {} {} {} after it was switched {}, but {} of it is {}",
             textOf(mark), output.name, mark.setting.on ? "on" : "off", secondsText(since),
-            mark.setting.on ? "off" : "on", mark.setting.on ? "min_off_ms" : "min_on_ms",
-            secondsText(least)));
+            mark.setting.on ? "off" : "on", least.name, secondsText(least_ns)));
       }
       if (!mark.setting.on && output.max_on_ns && since > *output.max_on_ns) {
         throw Refused(fmt::format(

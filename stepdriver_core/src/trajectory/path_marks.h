@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "config/least_time.h"
 #include "geometry/path.h"
 #include "output_setting.h"
 #include "path_timing/acceleration_limited.h"
@@ -20,8 +21,8 @@ namespace stepdriver::motion {
 struct PathOutput {
   std::string name;
   bool is_pwm = false;
-  std::int64_t min_on_ns = 0;
-  std::int64_t min_off_ns = 0;
+  config::LeastTime least_on;
+  config::LeastTime least_off;
   std::optional<std::int64_t> max_on_ns;
   std::int64_t lead_on_ns = 0;
   std::int64_t lead_off_ns = 0;

@@ -511,7 +511,7 @@ void QueuedPath::keepMarks(PathWindow& window, const Start& start, std::size_t d
   constexpr std::int64_t kLongAgo = 60'000'000'000;
   std::int64_t margin = kLongAgo;
   for (const PathOutput& output : *window.frame.outputs) {
-    margin = std::max({margin, kLongAgo + output.min_on_ns, kLongAgo + output.min_off_ns});
+    margin = std::max({margin, kLongAgo + output.least_on.ns, kLongAgo + output.least_off.ns});
   }
   window.marks_passed = window_->marks_passed;
   window.marks_passed.resize(window.frame.outputs->size());

@@ -221,6 +221,16 @@ TEST(ReadIo, ReadsPwmOutputsAndServos) {
   EXPECT_TRUE(read.outputs.at(0).level(true));
 }
 
+TEST(ReadIo, RefusesAPwmOutputThatMayNotBeOnForAPeriod) {
+  ConfigValue servo = machineWithPwm("servo");
+  put(servo, "outputs/pen/max_on_s", 0.02);
+  EXPECT_EQ(linesOf(Read(servo).issues), Lines());
+  put(servo, "outputs/pen/max_on_s", 0.0199);
+  EXPECT_EQ(linesOf(Read(servo).issues),
+            Lines{"/outputs/pen/max_on_s: is 0.0199, but the PWM period is 0.02 s: the output "
+                  "can't stay on for longer than it may"});
+}
+
 TEST(ReadIo, WritesPwmOutputsAndServosAsTheyAreRead) {
   for (const char* const line :
        {"pwmchip0:0/20000000/1000000/2000000", "pwmchip7:3/1000000/25000/300000",

@@ -241,6 +241,20 @@ TEST_F(NamedLines, LeastTimesDelayASwitchButNotTheSafeState) {
   EXPECT_EQ(switched(false).back(), switched(true).back());
 }
 
+TEST_F(NamedLines, APwmOutputStaysOnAndOffForAPeriodAtLeast) {
+  options.outputs[0].line = "pwmchip0:0/20000000/1000000/2000000";
+  options.outputs[0].min_on_ns = 19 * kMillisecond;
+  options.outputs[0].min_off_ns = 21 * kMillisecond;
+  begin();
+  bench->machine->setOutput("pen", true);
+  bench->machine->setOutput("pen", false);
+  EXPECT_EQ(switched(false).back() - switched(true).back(), 20 * kMillisecond);
+  bench->machine->setOutput("pen", true);
+  EXPECT_EQ(switched(true).back() - switched(false).back(), 21 * kMillisecond);
+  bench->machine->emergencyStop();
+  EXPECT_EQ(switched(false).back(), switched(true).back()) << "the safe state doesn't wait";
+}
+
 TEST_F(NamedLines, ACallThatWaitsForALeastTimeEndsWithWhatComesFirst) {
   options.outputs[0].min_on_ns = 60 * kSecond;
   begin(true);
@@ -319,6 +333,8 @@ TEST_F(NamedLines, AShutdownAndTheEndOfTheMachineLeaveTheSafeState) {
 TEST_F(NamedLines, AreInTheFlightRecorder) {
   begin();
   unsafe();
+  bench->rig.pressInput("probe", true, bench->clock.now());
+  bench->machine->advance(0.01);
   const machine::Recording recording = bench->machine->recording();
   int found = 0;
   for (const machine::Recording::Pin& pin : recording.pins) {
@@ -330,10 +346,12 @@ TEST_F(NamedLines, AreInTheFlightRecorder) {
     EXPECT_GE(edges, 1) << pin.name;
   }
   EXPECT_EQ(found, 2);
-  const bool told = std::any_of(
-      recording.events.begin(), recording.events.end(),
-      [](const auto& event) { return event.text.find("switch pen on") != std::string::npos; });
-  EXPECT_TRUE(told);
+  for (const char* const words : {"switch pen on", "input probe.line went low, 0 ms before"}) {
+    EXPECT_TRUE(
+        std::any_of(recording.events.begin(), recording.events.end(),
+                    [&](const auto& event) { return event.text.find(words) != std::string::npos; }))
+        << words;
+  }
 }
 
 TEST_F(NamedLines, WrongOnesOfAProgramAreRefused) {

@@ -494,6 +494,29 @@ TEST_F(PathOutputs, WhatALineCannotMakeIsRefusedBeforeAnythingMoves) {
   EXPECT_EQ(finish(request).marks_made, 1U);
 }
 
+// The pulses of a servo come every 20 ms.
+TEST_F(PathOutputs, APwmOutputIsNotSwitchedFasterThanItsPulsesCome) {
+  options.outputs[0].line = "pwmchip0:0/20000000/1000000/2000000";
+  options.outputs[0].min_off_ns = 30 * kMillisecond;
+  begin();
+  // 8000 steps/s.
+  EXPECT_REFUSED(followPath(dashes({2000, 2100, 6000})),
+                 "segment 2 of the path switches the output pen off 0.0125");
+  EXPECT_REFUSED(followPath(dashes({2000, 2100, 6000})), "but the PWM period of it is 0.02 s");
+  EXPECT_REFUSED(followPath(dashes({2000, 3000, 3200, 6000})), "but min_off_ms of it is 0.03 s");
+  EXPECT_EQ(finish(dashes({2000, 2200, 2500, 6000})).marks_made, 3U);
+  EXPECT_EQ(edges().size(), 3U);
+  // What was switched before the path counts too.
+  machine().setOutput("pen", false);
+  machine().setOutput("pen", true);
+  machine().axis("x").setPosition(0.0);
+  PathRequest at_once{{"x"}, {}, false, 0.0, 0.0};
+  at_once.segments = {with(lineTo({0.01}), {{"pen", false}})};
+  finish(at_once);
+  ASSERT_EQ(edges().size(), 6U);
+  EXPECT_EQ(edges()[5] - edges()[4], 20 * kMillisecond);
+}
+
 TEST_F(PathOutputs, ThePathWaitsForTheLeastTimesOfWhatWasSwitchedBefore) {
   options.outputs[0].min_on_ns = kSecond;
   begin();

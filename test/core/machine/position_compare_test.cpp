@@ -531,6 +531,30 @@ TEST_F(PositionCompareTest, WhatCannotBeMadeIsRefusedWithTheNumber) {
   EXPECT_TRUE(edges().empty());
 }
 
+// The pulses of a servo come every 20 ms, in which x goes 2 mm.
+TEST_F(PositionCompareTest, APwmOutputIsNotSwitchedFasterThanItsPulsesCome) {
+  options.outputs[0].line = "pwmchip0:0/20000000/1000000/2000000";
+  begin();
+  const auto refused = [this](const PositionCompare& compare, const std::string& why) {
+    EXPECT_REFUSED(machine().setPositionCompare("camera", compare), why);
+  };
+  refused(at({0.05}, 19e-3), "has a pulse of 0.019 s, but the PWM period of it is 0.02 s");
+  refused(every(0.0039, 0.0, 0.1, 20e-3),
+          "takes 0.039 s at 0.1 m/s, but a pulse and the PWM period of it are 0.04 s");
+  refused(cam(0.01, 0.0119),
+          "has a cam of 0.0019 m, for which x takes 0.019 s at 0.1 m/s, but the PWM period of it "
+          "is 0.02 s");
+  PositionCompare cams = cam(0.01, 0.02);
+  cams.cams.push_back({0.0215, 0.03});
+  refused(cams, "s at 0.1 m/s, but the PWM period of it is 0.02 s");
+  EXPECT_TRUE(edges().empty());
+  machine().setPositionCompare("camera", every(0.0041, 0.0041, 0.041, 20e-3));
+  move(0.05);
+  EXPECT_EQ(shown().compared, 10U);
+  EXPECT_EQ(shown().missed, 0U);
+  EXPECT_EQ(edges().size(), 20U);
+}
+
 TEST_F(PositionCompareTest, NothingElseSwitchesItMeanwhile) {
   machine().setPositionCompare("camera", at({0.01}));
   EXPECT_REFUSED(machine().setOutput("camera", true),

@@ -66,7 +66,8 @@ struct OutputConfig {
   bool at_fault = false;
   /// [ns] It is switched off when it has been on for this long; empty: it may stay on.
   std::optional<std::int64_t> max_on_ns;
-  /// [ns] How long it stays on, or off, at least. The safe state doesn't wait for that.
+  /// [ns] How long it stays on, or off, at least; a PWM output for its period in any case. The safe
+  /// state doesn't wait for that.
   std::int64_t min_on_ns = 0;
   std::int64_t min_off_ns = 0;
   /// From the start on, until Machine::setPositionCompare() or clearPositionCompare().
