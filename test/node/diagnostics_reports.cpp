@@ -4,6 +4,7 @@
 
 #include "node/diagnostics/axis_diagnostics.h"
 #include "node/diagnostics/engine_diagnostics.h"
+#include "node/diagnostics/named_lines_diagnostics.h"
 #include "support/says.h"
 
 // Tests that one cause alone is enough for each level, and that the level ends with the cause.
@@ -194,6 +195,38 @@ TEST_F(EngineReport, HasTheNumbers) {
   DiagnosticStatusWrapper simulated;
   reportEngine(reading, simulated);
   expectSays(valueOf(simulated, "margin"), "not measured");
+}
+
+TEST(NamedLinesReport, TellsEachLineAndThoseThatCannotBeWrittenOrRead) {
+  machine::IoStates states;
+  states.outputs.resize(2);
+  states.outputs[0].name = "pen";
+  states.outputs[1].name = "laser";
+  states.outputs[1].on = true;
+  states.outputs[1].value = 0.4;
+  states.inputs.resize(2);
+  states.inputs[0].name = "probe";
+  states.inputs[1].name = "button";
+  states.inputs[1].active = true;
+  DiagnosticStatusWrapper status;
+  reportNamedLines(states, status);
+  EXPECT_EQ(static_cast<int>(status.level), DiagnosticStatus::OK) << status.message;
+  EXPECT_EQ(valueOf(status, "output pen"), "off");
+  EXPECT_EQ(valueOf(status, "output laser"), "on at 0.4");
+  EXPECT_EQ(valueOf(status, "input probe"), "inactive");
+  EXPECT_EQ(valueOf(status, "input button"), "active");
+  states.outputs[0].note = "was switched off";
+  DiagnosticStatusWrapper noted;
+  reportNamedLines(states, noted);
+  EXPECT_EQ(static_cast<int>(noted.level), DiagnosticStatus::WARN);
+  expectSays(noted.message, "pen was switched off");
+  states.inputs[0].error = "the line GPIO5 of the input probe can't be read: EIO";
+  DiagnosticStatusWrapper failed;
+  reportNamedLines(states, failed);
+  EXPECT_EQ(static_cast<int>(failed.level), DiagnosticStatus::ERROR);
+  expectSays(failed.message, "the line GPIO5 of the input probe can't be read: EIO");
+  EXPECT_EQ(valueOf(failed, "input probe"), "inactive (uncertain)");
+  EXPECT_EQ(valueOf(failed, "input button"), "active");
 }
 
 }  // namespace

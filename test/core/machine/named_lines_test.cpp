@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stepdriver_core/error.h"
@@ -15,6 +16,8 @@
 #include "stepdriver_core/setup/simulation.h"
 #include "support/bench.h"
 #include "support/constants.h"
+#include "support/making_backend.h"
+#include "support/passing_lines.h"
 #include "support/refusal.h"
 
 // Outputs and inputs with a name.
@@ -402,6 +405,46 @@ TEST_F(NamedLines, AShortGlitchIsNoChangeWithADebounce) {
   bench->machine->advance(0.002);
   EXPECT_TRUE(bench->machine->ioStates().inputs[0].active);
   EXPECT_EQ(bench->machine->ioStates().inputs[0].changed, pressed);
+}
+
+/// Lines of which an input can't be read.
+class UnreadableLines : public test::PassingLines {
+ public:
+  UnreadableLines(std::unique_ptr<gpio::Lines> lines, const bool& fails)
+      : PassingLines(std::move(lines)), fails_(fails) {}
+  int read(int input) noexcept override {
+    return fails_ && inputName(input) == "probe.line" ? -EIO : PassingLines::read(input);
+  }
+
+ private:
+  const bool& fails_;
+};
+
+TEST_F(NamedLines, AnInputThatCannotBeReadSaysSoUntilItCan) {
+  begin();
+  bool fails = false;
+  test::MakingBackend backend([&](const auto& outputs, const auto& inputs) {
+    return std::make_unique<UnreadableLines>(bench->backend.request(outputs, inputs), fails);
+  });
+  bench->machine.reset();
+  bench->machine = std::make_unique<test::UnthreadedMachine>(axes, backend, bench->clock, options);
+  const auto probe = [this] { return bench->machine->ioStates().inputs.at(0); };
+  EXPECT_EQ(probe().error, "");
+  fails = true;
+  bench->rig.pressInput("probe", true, bench->clock.now());
+  bench->machine->advance(0.2);
+  EXPECT_EQ(probe().error,
+            "the line probe.line of the input probe can't be read: EIO, input/output error");
+  EXPECT_EQ(fault(), "") << "no axis needs it";
+  const std::vector<machine::Recording::Event> events = bench->machine->recording().events;
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const auto& event) {
+    return event.text.find("input probe.line can't be read: EIO") != std::string::npos;
+  }));
+  fails = false;
+  bench->machine->advance(0.2);
+  EXPECT_EQ(probe().error, "");
+  EXPECT_TRUE(probe().active);
+  bench->machine.reset();
 }
 
 // The rig reports the first edge only: all bounces are lost edges.

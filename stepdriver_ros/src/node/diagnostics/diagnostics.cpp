@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "axis_diagnostics.h"
-#include "common/io_words.h"
 #include "engine_diagnostics.h"
+#include "named_lines_diagnostics.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/step_rates.h"
 
@@ -55,7 +55,8 @@ Diagnostics::Diagnostics(ros::NodeHandle node, const ros::NodeHandle& private_no
   updater_.add(kEngineName, [this](Status& status) { fillEngineStatus(status); });
   updater_.add(kMasterName, [this](Status& status) { fillMasterStatus(status); });
   if (!config.outputs.empty() || !config.inputs.empty()) {
-    updater_.add(kNamedLinesName, [this](Status& status) { fillNamedLinesStatus(status); });
+    updater_.add(kNamedLinesName,
+                 [this](Status& status) { reportNamedLines(machine_.ioStates(), status); });
   }
   if (!state_file_.empty()) {
     updater_.add(kStateFileName, [this](Status& status) { fillStateFileStatus(status); });
@@ -101,24 +102,6 @@ void Diagnostics::fillMasterStatus(Status& status) const {
   status.add("URI", reading.uri);
   status.add("silent [s]", fmt::format("{:.0f}", reading.silent));
   status.add("times registered again", reading.restarts);
-}
-
-void Diagnostics::fillNamedLinesStatus(Status& status) const {
-  const machine::IoStates states = machine_.ioStates();
-  status.summary(Status::OK, "as they were switched");
-  const auto add = [&](const std::string& name, const std::string& text, const std::string& error) {
-    if (!error.empty()) status.mergeSummary(Status::ERROR, error);
-    status.add(name, error.empty() ? text : text + " (uncertain)");
-  };
-  for (const machine::OutputState& output : states.outputs) {
-    if (!output.note.empty()) {
-      status.mergeSummary(Status::WARN, fmt::format("{} {}", output.name, output.note));
-    }
-    add("output " + output.name, outputWords(output.on, output.value), output.error);
-  }
-  for (const machine::InputState& input : states.inputs) {
-    add("input " + input.name, input.active ? "active" : "inactive", input.error);
-  }
 }
 
 void Diagnostics::fillStateFileStatus(Status& status) const {

@@ -37,7 +37,6 @@ class Diagnostics {
   static void fillAxisStatus(const axis::Axis& axis, Status& status);
   void fillEngineStatus(Status& status);
   void fillMasterStatus(Status& status) const;
-  void fillNamedLinesStatus(Status& status) const;
   void fillStateFileStatus(Status& status) const;
   void fillRecorderStatus(Status& status) const;
 
