@@ -53,6 +53,8 @@ constexpr double kRecording = 2.0;          // [s] until a flight recording is w
 // [MB] of the node, from the first quarter of the storm on. A node with a sanitizer needs another
 // `~most_growth`.
 constexpr double kMostGrowth = 8.0;
+/// A motion alone may have the lowest limits and speed override.
+constexpr std::chrono::seconds kLongestAlone{120};
 constexpr std::size_t kMostReported = 10;
 
 /// The last states of the axes that the node has published.
@@ -238,8 +240,10 @@ void Storm::repair() {
 void Storm::noteRest() {
   // A state that is under way may be from before the last motion began.
   const int known = states_->count();
-  if (!waitUntil(
-          [&] { return !isAlive() || (states_->count() > known + 1 && states_->atRest()); })) {
+  const auto rests = [&] {
+    return !isAlive() || (states_->count() > known + 1 && states_->atRest());
+  };
+  if (!waitUntil(rests, kLongestAlone)) {
     fail("the axes don't come to rest");
     return;
   }
