@@ -423,7 +423,7 @@ class Participants : private machine::ShellCore::Host {
   bool closed_ = false;
   bool close_was_served_ = false;
   std::vector<std::pair<std::string, axis::Move>> moves_;
-  std::set<std::uint64_t> open_paths_;            // moves along paths of which more is to come
+  std::set<std::uint64_t> open_paths_;  // moves along paths of which more is to come
   // The outcomes of paths that switch an output, and how often each does.
   std::vector<std::pair<std::shared_ptr<const axis::Outcome<axis::MoveResult>>, std::size_t>>
       marked_;
