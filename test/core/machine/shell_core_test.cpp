@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <map>
 #include <memory>
 #include <string>
@@ -143,6 +144,19 @@ TEST(ShellCore, RefusesARequestIfTooManyWait) {
   EXPECT_EQ(machine.core().post(1'000, StopAll{}), "too many requests are already waiting");
   machine.settle();
   EXPECT_FALSE(machine.answerOf(StopAll{}).failure);
+}
+
+// Such as before its first write: then no line is to blame.
+TEST(ShellCore, SaysThatTheEngineHangsWhereverItDoes) {
+  for (const int line : {-1, 0}) {
+    ByHand machine;
+    machine.core().handle(EngineHangs{{ETIMEDOUT, line}});
+    const std::string fault = machine.core().snapshot()->axes.front().state.fault;
+    const char* const wanted = line < 0
+                                   ? "the thread that makes the pulses hangs, at none of its lines"
+                                   : "the ENABLE line x.enable";
+    EXPECT_NE(fault.find(wanted), std::string::npos) << fault;
+  }
 }
 
 }  // namespace
