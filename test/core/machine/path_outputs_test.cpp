@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -743,7 +744,8 @@ TEST_F(PathOutputs, AHundredThousandMarksOfAPathInParts) {
 
 // Random places, and random holds, overrides and stops at random times. The oracle knows only the
 // path's places, what the call reported, and the rig's trace: the n-th change of a line comes with
-// the step to its n-th place, and there are as many as were reported.
+// the step to its n-th place, and there are as many as were reported. STEPDRIVER_MOTIONS is the
+// number of motions of each seed, for long runs by hand.
 class RandomPathOutputs : public PathOutputs, public testing::WithParamInterface<int> {
  protected:
   double unit() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
@@ -758,8 +760,10 @@ class RandomPathOutputs : public PathOutputs, public testing::WithParamInterface
 };
 
 TEST_P(RandomPathOutputs, EachMarkComesOnceAtItsNanosecondOrIsReported) {
-  for (int run = 0; run < 40; ++run) {
-    const auto number = static_cast<unsigned>(GetParam() * 1000 + run);
+  const char* const wanted = std::getenv("STEPDRIVER_MOTIONS");
+  const int runs = wanted != nullptr ? std::atoi(wanted) : 40;
+  for (int run = 0; run < runs; ++run) {
+    const auto number = static_cast<unsigned>(GetParam() * 10'000 + run);
     SCOPED_TRACE(number);
     seed(number);
     begin();
@@ -805,7 +809,7 @@ TEST_P(RandomPathOutputs, EachMarkComesOnceAtItsNanosecondOrIsReported) {
     }
     ASSERT_EQ(times.size(), result.marks_made);
     const auto passed = static_cast<std::int64_t>(steps("x").size());
-    const std::vector<std::int64_t> wanted = timesOfSteps(counts);
+    const std::vector<std::int64_t> planned = timesOfSteps(counts);
     const std::vector<Step> all = steps("x");
     for (std::size_t i = 0; i < times.size(); ++i) {
       // While the rate changes, the steps are within a hundredth of a microstep of the path.
@@ -814,10 +818,10 @@ TEST_P(RandomPathOutputs, EachMarkComesOnceAtItsNanosecondOrIsReported) {
         return later > 0 && later < all.size() ? all[later].time_ns - all[later - 1].time_ns : 0;
       };
       const std::int64_t interval = std::max(since(step), since(step + 1));
-      ASSERT_LE(std::abs(times[i] - wanted[i]), 1 + interval / 100)
+      ASSERT_LE(std::abs(times[i] - planned[i]), 1 + interval / 100)
           << "mark " << i << " at count " << counts[i];
       ++marks_;
-      exact_ += std::abs(times[i] - wanted[i]) <= 1 ? 1 : 0;
+      exact_ += std::abs(times[i] - planned[i]) <= 1 ? 1 : 0;
     }
     if (result.marks_not_made > 0) {
       ASSERT_LE(passed, counts[result.marks_made]) << "it was passed, and not made";
