@@ -273,7 +273,7 @@ void Controller::on(const EngineHangs& hang) {
 
 std::string Controller::textOf(const pulse::LineFailure& failure) const {
   if (failure.line < 0) return "the thread that makes the pulses hangs, at none of its lines";
-  const std::string of_output =
+  std::string of_output =
       failure.input ? "" : requests_.named.outputs.failureText(failure, context_.lines);
   if (!of_output.empty()) return of_output;
   const auto owner = std::find_if(

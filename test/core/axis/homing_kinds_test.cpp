@@ -536,20 +536,20 @@ TEST_F(HomingToFlagTest, SaysThatAnIndexAloneDoesNotComeWithinTheTravel) {
 }
 
 TEST_F(HomingToFlagTest, SaysThatAnIndexIsStuckActive) {
-  const auto expectStuck = [this](const config::AxisConfig& config, const std::string& words) {
+  const auto expect_stuck = [this](const config::AxisConfig& config, const std::string& words) {
     buildFlag(config, {});
     bench->rig.stickInput("index", true, bench->clock.now());
     expectFails(words);
   };
   config::AxisConfig alone = indexAxis();
-  expectStuck(alone,
-              "the min endstop was met while leaving: the input index didn't become inactive");
+  expect_stuck(alone,
+               "the min endstop was met while leaving: the input index didn't become inactive");
   alone.homing->max_travel = 0.02;
-  expectStuck(alone, "the input index didn't become inactive within max_travel, 0.02 m");
+  expect_stuck(alone, "the input index didn't become inactive within max_travel, 0.02 m");
   alone.homing->timeout = 0.2;
-  expectStuck(alone, "the input index didn't become inactive within timeout_s, 0.2 s");
-  expectStuck(indexAxis("flag"),
-              "the index index didn't come within a turn of the edge of the input flag");
+  expect_stuck(alone, "the input index didn't become inactive within timeout_s, 0.2 s");
+  expect_stuck(indexAxis("flag"),
+               "the index index didn't come within a turn of the edge of the input flag");
 }
 
 // ---- the final position ----
