@@ -81,7 +81,7 @@ class NamedOutput {
   bool may_wait_ = false;                // whether it may wait for its least times
   bool is_taken_ = false;                // whether a path switches it
   std::uint64_t changes_seen_ = 0;       // by paths
-  std::uint64_t failures_seen_ = 0;      // of paths
+  std::uint64_t failures_seen_ = 0;      // in writes that paths ordered
   std::optional<Job> job_;               // being written
   pulse::Nanoseconds wrote_from_ = 0;    // when the last write began
   pulse::Nanoseconds wrote_until_ = -1;  // when its end was known

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +13,7 @@
 
 #include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/sim/pin_trace.h"
+#include "support/half_steps.h"
 
 namespace stepdriver::search {
 
@@ -53,7 +53,7 @@ class RiseWatch : public sim::PinTrace {
   /// The axis has a motor of phases, in half steps.
   void hasPhases(std::size_t axis) {
     motors_.at(axis).has_phases = true;
-    motors_.at(axis).pattern = patternOf(motors_.at(axis).coils);
+    motors_.at(axis).pattern = test::halfStepOf(motors_.at(axis).coils);
   }
   /// A write is over. What it has done to coils counts as one.
   void settle() {
@@ -102,7 +102,7 @@ class RiseWatch : public sim::PinTrace {
     std::int64_t step = 16;
     std::int64_t place = 0;
     bool has_phases = false;
-    std::array<bool, 4> coils{};
+    test::Coils coils{};
     std::optional<int> pattern;  // the last one that a step has; empty: none so far
     bool is_switching = false;
     std::int64_t switched_ns = 0;
@@ -120,21 +120,6 @@ class RiseWatch : public sim::PinTrace {
     return variable == "in4" ? Role::kIn4 : Role::kOther;
   }
 
-  // The half steps of a cycle; a coil is on in three of them.
-  static std::optional<int> patternOf(const std::array<bool, 4>& coils) {
-    static constexpr std::array<std::array<bool, 4>, 8> kPatterns = {{{true, true, false, false},
-                                                                      {false, true, false, false},
-                                                                      {false, true, true, false},
-                                                                      {false, false, true, false},
-                                                                      {false, false, true, true},
-                                                                      {false, false, false, true},
-                                                                      {true, false, false, true},
-                                                                      {true, false, false, false}}};
-    const auto* found = std::find(kPatterns.begin(), kPatterns.end(), coils);
-    if (found == kPatterns.end()) return {};
-    return static_cast<int>(found - kPatterns.begin());
-  }
-
   void switchCoil(const Pin& pin, bool level, std::int64_t time_ns) {
     Motor& motor = motors_[pin.axis];
     if (motor.is_switching && time_ns > motor.switched_ns) settle(pin.axis);
@@ -146,10 +131,9 @@ class RiseWatch : public sim::PinTrace {
   void settle(std::size_t axis) {
     Motor& motor = motors_[axis];
     motor.is_switching = false;
-    const std::optional<int> now = patternOf(motor.coils);
+    const std::optional<int> now = test::halfStepOf(motor.coils);
     if (!now || !motor.has_phases) return;
-    const int before = std::exchange(motor.pattern, now).value_or(*now);
-    const int way = (*now - before + 12) % 8 - 4;
+    const int way = test::wayBetween(std::exchange(motor.pattern, now).value_or(*now), *now);
     motor.place += way;
     if (way != 0 && rose) rose(axis, motor.switched_ns);
   }

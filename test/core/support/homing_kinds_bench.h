@@ -68,7 +68,7 @@ inline config::AxisConfig indexAxis(const std::string& flag = "") {
 struct HomingRig {
   double start = 0.0;       // [mm]
   double hysteresis = 0.0;  // [mm] of the flag and the index
-  int bounces = 0;          // of what tells the trigger point
+  int bounces = 0;          // What tells the trigger point bounces so often.
   bool has_flag = true;
   bool has_index = true;
   double flag_every = 0.0;  // [mm] 0: there is one flag
@@ -157,7 +157,7 @@ class HomingKindsTest : public testing::Test {
 
   std::unique_ptr<Bench> bench;
   double index_at = 25.0;            // [mm] the first one of a turn: -15 mm, 25 mm and 65 mm
-  std::int64_t bounce_ns = 200'000;  // of a flag or an index
+  std::int64_t bounce_ns = 200'000;  // That long a flag or an index bounces.
 };
 
 }  // namespace stepdriver::test

@@ -1,10 +1,11 @@
 #include "storm/pulses.h"
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <set>
 #include <stdexcept>
+#include <utility>
+
+#include "support/half_steps.h"
 
 namespace stepdriver::storm {
 namespace {
@@ -63,20 +64,7 @@ class StepSize {
   std::vector<Level> pins_;
 };
 
-// The half steps of a cycle.
-constexpr std::array<std::array<bool, 4>, 8> kPatterns = {{{true, true, false, false},
-                                                           {false, true, false, false},
-                                                           {false, true, true, false},
-                                                           {false, false, true, false},
-                                                           {false, false, true, true},
-                                                           {false, false, false, true},
-                                                           {true, false, false, true},
-                                                           {true, false, false, false}}};
-
-// A write switches several coils within this time; steps are farther apart.
-constexpr std::int64_t kOneWrite = 100'000;  // [ns]
-
-// What a write has done counts as one. Coils that go off together keep the motor's place.
+// All that a write switches has one time. Coils that go off together keep the motor's place.
 std::vector<Pulse> pulsesOfCoils(const Trace& trace, const std::string& axis) {
   std::vector<Level> coils;
   std::set<std::int64_t> times;
@@ -87,16 +75,13 @@ std::vector<Pulse> pulsesOfCoils(const Trace& trace, const std::string& axis) {
   }
   std::vector<Pulse> pulses;
   std::int64_t count = 0;
-  int number = 0;  // of the last pattern
-  for (auto next = times.begin(); next != times.end();) {
-    const std::int64_t time = *next++;
-    if (next != times.end() && *next - time < kOneWrite) continue;
-    std::array<bool, 4> now{};
-    for (std::size_t i = 0; i < now.size(); ++i) now.at(i) = coils[i].at(time);
-    const auto* found = std::find(kPatterns.begin(), kPatterns.end(), now);
-    if (found == kPatterns.end()) continue;
-    const int way = (static_cast<int>(found - kPatterns.begin()) - number + 12) % 8 - 4;
-    number = static_cast<int>(found - kPatterns.begin());
+  int last = 0;  // A motor that has never turned begins with the first half step.
+  for (const std::int64_t time : times) {
+    test::Coils on{};
+    for (std::size_t i = 0; i < on.size(); ++i) on.at(i) = coils[i].at(time);
+    const auto now = test::halfStepOf(on);
+    if (!now) continue;
+    const int way = test::wayBetween(std::exchange(last, *now), *now);
     if (way == 0) continue;
     count += way;
     pulses.push_back({time, count});

@@ -292,10 +292,10 @@ struct RigFaults {
 /// high at the chip is forward: the carriage's position grows. On a chip with CW and CCW inputs,
 /// pulses on CW are forward, and those on CCW backward. Lines that switch the coils of a motor act
 /// together at the end of their write: current flows while any of them is on, and a pulse is a step
-/// to another pattern. While a brake is engaged the rotor doesn't
-/// turn; when it is released, the rotor snaps as above. A load turns the rotor back while neither
-/// current nor the brake holds it. Without motor power no current flows in any axis; when the power
-/// comes, each chip with a translator begins with it at the nearest Home.
+/// to another pattern. While a brake is engaged the rotor doesn't turn; when it is released, the
+/// rotor snaps as above. A load turns the rotor back while neither current nor the brake holds it.
+/// Without motor power no current flows in any axis; when the power comes, each chip with a
+/// translator begins with it at the nearest Home.
 ///
 /// Lines. Before its first request a line has the level of a pull resistor towards the safe side:
 /// disabled, asleep, in RESET, everything else inactive or low. The first request makes no edge:
