@@ -10,6 +10,7 @@
 #include "message_text.h"
 #include "path_plan.h"
 #include "printable.h"
+#include "profile/errors.h"
 #include "stepdriver_core/error.h"
 
 namespace stepdriver::motion {
