@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Draws the pictures of docs/motion.md from recorded traces; motion_pictures.sh calls it."""
 
+import bisect
 import cmath
 import csv
 import pathlib
@@ -12,6 +13,7 @@ from stepdriver_plots.figure import COLOURS, MultipleLocator, plt  # noqa: E402
 from stepdriver_plots.step_curve import StepCurve  # noqa: E402
 
 UNITS = {"position": "steps", "speed": "steps/s", "acceleration": "steps/s$^2$"}
+STEPS_PER_MM = 80  # of the traces with outputs or flags
 
 
 class Trace:
@@ -19,6 +21,7 @@ class Trace:
         self.marks = []
         self.steps = {}  # for each axis: times [s] and counts
         self.curves = {}  # by name: times [s] and values
+        self.levels = {}  # of outputs and flags, by name: times [s] and levels
         with open(folder / (name + ".csv"), newline="") as file:
             for kind, axis, time_ns, what in csv.reader(file):
                 time = int(time_ns) * 1e-9
@@ -28,6 +31,10 @@ class Trace:
                     times, values = self.curves.setdefault(axis, ([], []))
                     times.append(time)
                     values.append(int(what) / 1000)
+                elif kind == "level":
+                    times, levels = self.levels.setdefault(axis, ([], []))
+                    times.append(time)
+                    levels.append(int(what))
                 else:
                     times, counts = self.steps.setdefault(axis, ([], []))
                     times.append(time)
@@ -35,6 +42,24 @@ class Trace:
 
     def curve(self, axis):
         return StepCurve.of_counts(*self.steps[axis])
+
+    def end(self):
+        return max(times[-1] for times, _ in self.steps.values())
+
+    def places(self, axis, start=0.0):
+        """Times [s] and positions [mm] from the begin to the end."""
+        times, counts = self.steps[axis]
+        return ([0.0] + times + [self.end()],
+                [start + count / STEPS_PER_MM for count in [0] + counts + counts[-1:]])
+
+    def place_at(self, axis, time):
+        """[mm]"""
+        times, places = self.places(axis)
+        return places[bisect.bisect_right(times, time) - 1]
+
+    def switched(self, name, on):
+        """Times [s]."""
+        return [time for time, level in zip(*self.levels[name]) if level == on and time > 0.0]
 
 
 def draw(folder, picture, curves, what, width=6.4, phases=(), levels=()):
@@ -155,6 +180,106 @@ def draw_rotor(folder, picture, trace):
     save(figure, folder, picture)
 
 
+def two_panels(height=2.8):
+    """A high one, and a low one below it for levels."""
+    return plt.subplots(2, 1, sharex=True, figsize=(6.4, height), gridspec_kw={"height_ratios": [3, 1]})
+
+
+def plot_level(panel, trace, name, label, colour, base=0.0):
+    times, levels = trace.levels[name]
+    panel.step(times + [trace.end()], [base + 0.8 * level for level in levels + levels[-1:]],
+               where="post", color=colour)
+    panel.annotate(label, (1.0, base + 0.4), xycoords=("axes fraction", "data"), xytext=(3, 0),
+                   textcoords="offset points", va="center", color=colour, annotation_clip=False)
+
+
+def finish_levels(panel, count=1):
+    panel.set_ylim(-0.2, count)
+    panel.set_yticks([])
+    panel.set_xlabel("time [s]")
+
+
+def draw_position_compare(folder, trace):
+    """The position, with a dot where the camera was triggered, and its line."""
+    figure, (places, levels) = two_panels()
+    places.plot(*trace.places("x"), color=COLOURS[0], drawstyle="steps-post")
+    triggers = trace.switched("camera", 1)
+    places.plot(triggers, [trace.place_at("x", time) for time in triggers], "o", color=COLOURS[1],
+                markersize=3, label="the camera is triggered")
+    for time, words in trace.marks:
+        places.axvline(time, color="#888888", linewidth=0.8, linestyle=":")
+        places.annotate(words, (time, 1.0), xycoords=("data", "axes fraction"), xytext=(2, 1),
+                        textcoords="offset points", color="#555555")
+    plot_level(levels, trace, "camera", "camera", COLOURS[1])
+    finish_levels(levels)
+    places.yaxis.set_major_locator(MultipleLocator(4))
+    places.set_ylabel("x [mm]")
+    places.legend(loc="lower center", bbox_to_anchor=(0.55, 0.0), frameon=False)
+    save(figure, folder, "position_compare")
+
+
+def draw_path_outputs(folder, trace):
+    """The path, with the parts on which the laser was on, and its line over time."""
+    marks = [(5.0, 0.0), (30.0, 15.0), (30.0, 20.0), (30.0, 26.0)]
+    figure, (plan, levels) = plt.subplots(1, 2, figsize=(6.4, 2.8), gridspec_kw={"width_ratios": [3, 2]})
+    times = sorted(time for axis in "xy" for time in trace.steps[axis][0])
+    positions = [(trace.place_at("x", time), trace.place_at("y", time)) for time in times]
+    plan.plot(*zip(*positions), color="#aaaaaa", linewidth=0.8, label="the path")
+    spans = list(zip(trace.switched("laser", 1), trace.switched("laser", 0)))
+    for number, (begin, end) in enumerate(spans):
+        lit = positions[bisect.bisect_left(times, begin):bisect.bisect_left(times, end)]
+        plan.plot(*zip(*lit), color=COLOURS[1], linewidth=2.4, label=None if number else "the line is on")
+    plan.plot(*zip(*marks), "o", color=COLOURS[0], markersize=4, label="the marks")
+    plan.set_aspect("equal")
+    plan.set_xlabel("x [mm]")
+    plan.set_ylabel("y [mm]")
+    plan.legend(loc="upper left", frameon=False)
+    reached = [min(zip(times, positions), key=lambda step, mark=mark: abs(complex(*step[1]) - complex(*mark)))[0]
+               for mark in marks]
+    for number, time in enumerate(reached):
+        levels.axvline(time, color=COLOURS[0], linewidth=0.8, linestyle=":")
+        if number == 0:
+            levels.annotate("at the mark", (time, 1.0), xycoords=("data", "axes fraction"), xytext=(2, 1),
+                            textcoords="offset points", color=COLOURS[0])
+    plot_level(levels, trace, "laser", "", COLOURS[1])
+    finish_levels(levels)
+    levels.set_ylabel("laser")
+    save(figure, folder, "path_outputs")
+
+
+def draw_probe(folder, trace):
+    figure, (places, levels) = two_panels()
+    places.plot(*trace.places("x"), color=COLOURS[0])
+    for number, time in enumerate(trace.switched("flag1", 1)):
+        places.plot(time, trace.place_at("x", time), "o", color=COLOURS[1], markersize=4,
+                    label=None if number else "contact")
+    places.axhline(20.0, color="#888888", linewidth=0.8, linestyle="--")
+    plot_level(levels, trace, "flag1", "probe", COLOURS[1])
+    finish_levels(levels)
+    places.set_ylabel("x [mm]")
+    places.legend(loc="lower right", frameon=False)
+    save(figure, folder, "probe")
+
+
+def draw_flag(folder, homings):
+    """homings: (trace, where it began [mm]) for each."""
+    figure, (places, levels) = two_panels()
+    places.axhspan(20.0, 30.0, color="#eeeeee")
+    places.annotate("the flag", (0.02, 25.0), xycoords=("axes fraction", "data"), va="center",
+                    color="#555555")
+    for number, (colour, (trace, start)) in enumerate(zip(COLOURS, homings)):
+        times, positions = trace.places("x", start)
+        places.plot(times, positions, color=colour, label=f"from {start:g} mm")
+        edge = trace.switched("flag1", 1)[-1]
+        places.plot(edge, positions[bisect.bisect_right(times, edge) - 1], "o", color=colour, markersize=4)
+        plot_level(levels, trace, "flag1", "", colour, base=float(len(homings) - 1 - number))
+    finish_levels(levels, len(homings))
+    levels.set_ylabel("pressed")
+    places.set_ylabel("x [mm]")
+    places.legend(loc="upper right", frameon=False)
+    save(figure, folder, "homing_flag")
+
+
 def save(figure, folder, picture):
     look.save(figure, folder / (picture + ".svg"))
 
@@ -190,6 +315,10 @@ def main(traces, pictures):
     draw_shaper(pictures, trace("input_shaper"), 8.0, 1.0)
     for name in ("rotor_follows", "rotor_falls_out"):
         draw_rotor(pictures, name, trace(name))
+    draw_position_compare(pictures, trace("position_compare"))
+    draw_path_outputs(pictures, trace("path_outputs"))
+    draw_probe(pictures, trace("probe"))
+    draw_flag(pictures, [(trace("flag_from_below"), 5.0), (trace("flag_from_above"), 45.0)])
 
 
 if __name__ == "__main__":

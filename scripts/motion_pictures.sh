@@ -8,7 +8,7 @@ usage() {
   cat <<'END'
 usage: scripts/motion_pictures.sh [--check]
 
-Builds the core's trace_tests, runs their test MotionPictures, and draws docs/pictures from its traces.
+Builds the core's trace_tests, runs their tests of pictures, and draws docs/pictures from its traces.
 Installs missing packages.
 
   --check  draws the pictures into another folder, and checks that docs/motion.md shows each of them and

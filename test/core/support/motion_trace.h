@@ -12,13 +12,19 @@
 
 namespace stepdriver::test {
 
-/// Records the edges of the STEP and DIR lines of a bench, from which pictures of a motion are
-/// drawn.
+/// Records the edges of the STEP and DIR lines of a bench, and those of its outputs and flags, from
+/// which pictures of a motion are drawn.
 class MotionTrace {
  public:
   struct Step {
     double time = 0.0;       ///< [s] when the edge came, after the trace began
     std::int64_t count = 0;  ///< [microsteps] where the axis is after the edge
+  };
+
+  /// The level of an output, or of a flag that a carriage presses.
+  struct Level {
+    double time = 0.0;  ///< [s] when the line took it, after the trace began; 0: it had it then
+    bool level = false;
   };
 
   /// @param bench outlives the trace, and its axes are at 0.
@@ -55,14 +61,35 @@ class MotionTrace {
     return 0.0;
   }
 
+  /// @param scope, variable of the pin in the rig's trace
+  std::vector<Level> levels(const std::string& scope, const std::string& variable) const {
+    const sim::MemoryTrace& trace = *bench_.trace;
+    const int pin = trace.pin(scope, variable);
+    std::vector<Level> found{{0.0, trace.levels()[static_cast<std::size_t>(pin)]}};
+    for (const sim::MemoryTrace::Edge& edge : trace.edges()) {
+      if (edge.pin == pin) found.push_back({seconds(edge.time_ns), edge.level});
+    }
+    return found;
+  }
+  /// [s] When a pin took this level.
+  std::vector<double> times(const std::string& scope, const std::string& variable,
+                            bool level) const {
+    std::vector<double> found;
+    for (const std::int64_t time : bench_.trace->times(scope, variable, level)) {
+      found.push_back(seconds(time));
+    }
+    return found;
+  }
+
   /// Adds a curve to the picture: its points, by their times [s].
   void add(const std::string& name, std::vector<std::pair<double, double>> points) {
     curves_.emplace_back(name, std::move(points));
   }
 
   /// If the environment variable STEPDRIVER_TRACES names a folder, writes the trace to NAME.csv
-  /// there: `step,AXIS,TIME_NS,COUNT` for each step, `mark,,TIME_NS,WORDS`, and
-  /// `curve,NAME,TIME_NS,VALUE` for each point of a curve, in thousandths.
+  /// there: `step,AXIS,TIME_NS,COUNT` for each step, `mark,,TIME_NS,WORDS`,
+  /// `curve,NAME,TIME_NS,VALUE` for each point of a curve, in thousandths, and
+  /// `level,NAME,TIME_NS,LEVEL` for each level of an output or a flag.
   void keep(const std::string& name) const {
     const char* const folder = std::getenv("STEPDRIVER_TRACES");
     if (folder == nullptr) return;
@@ -76,6 +103,12 @@ class MotionTrace {
     for (const std::string& axis : bench_.rig.axes()) {
       for (const Step& step : steps(axis)) {
         file << "step," << axis << ',' << ns(step.time) << ',' << step.count << '\n';
+      }
+    }
+    for (const sim::TracePin& pin : bench_.trace->pins()) {
+      if (pin.scope != "outputs" && pin.variable.rfind("flag", 0) != 0) continue;
+      for (const Level& each : levels(pin.scope, pin.variable)) {
+        file << "level," << pin.variable << ',' << ns(each.time) << ',' << each.level << '\n';
       }
     }
   }
