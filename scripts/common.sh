@@ -213,7 +213,8 @@ roomy=$(awk -v jobs="$jobs" '$1 == "MemTotal:" && $2 / jobs >= 2e6 { print " --p
   /proc/meminfo 2>/dev/null) || true
 # With -g1 a backtrace names each line, and the compiler is a third faster than with all that a debugger
 # could show.
-build_type=(-DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG$roomy")
+build_type=(-DCMAKE_BUILD_TYPE=RelWithDebInfo "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2 -g1 -DNDEBUG$roomy"
+  -DCMAKE_UNITY_BUILD_BATCH_SIZE=24)  # one file of so many takes 15 % less time than three of eight
 
 configure() {
   local from=$1 into=$2

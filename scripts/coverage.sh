@@ -29,7 +29,7 @@ coverage=$build/coverage
 
 configure_coverage() {
   discard_foreign_build "$src/stepdriver_core" "$coverage/core"
-  (cd "$src/stepdriver_core" && cmake --preset coverage -B "$coverage/core" -DCMAKE_UNITY_BUILD=ON)
+  (cd "$src/stepdriver_core" && cmake --preset coverage -B "$coverage/core")
 }
 quietly coverage-configure configure_coverage
 say "Building (tail -f $build/log/coverage-build.log)"

@@ -143,10 +143,8 @@ for room in "${rooms[@]}"; do targets+=("${room}_tests"); done
 ((${#targets[@]} > 0)) && targets+=(check_waveform trace_tests) || targets=(all)
 [[ $only != board ]] || targets=(stepdriver_core_yaml)
 
-# Several files are compiled as one, which takes half the time.
 configure_cross() {
-  configure "$src/stepdriver_core" "$cross/core" "-DCMAKE_TOOLCHAIN_FILE=$cross/toolchain.cmake" "$strict" \
-    -DCMAKE_UNITY_BUILD=ON
+  configure "$src/stepdriver_core" "$cross/core" "-DCMAKE_TOOLCHAIN_FILE=$cross/toolchain.cmake" "$strict"
 }
 build_cross() { cmake --build "$cross/core" -j "$jobs" --target "${targets[@]}"; }
 

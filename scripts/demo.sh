@@ -82,8 +82,7 @@ move() {
 build_demo() {
   configure "$src" "$build/demo/catkin" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DCMAKE_INSTALL_PREFIX="$build/install" "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG$roomy" \
-    -DCATKIN_ENABLE_TESTING=OFF -DCMAKE_UNITY_BUILD=ON \
-    -DCMAKE_UNITY_BUILD_BATCH_SIZE=40 &&
+    -DCATKIN_ENABLE_TESTING=OFF -DCMAKE_UNITY_BUILD_BATCH_SIZE=40 &&
     cmake --build "$build/demo/catkin" -j "$jobs"
 }
 

@@ -24,7 +24,7 @@ say "Building the package (tail -f $build/log/python-build.log)"
 build_python() {
   # Optimized like the other builds, but without what a debugger needs; and several files at once.
   cmake -S "$src/stepdriver_core" -B "$build/python" -DCMAKE_BUILD_TYPE=Release \
-    "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG$roomy" -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 \
+    "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG$roomy" -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 \
     -DSTEPDRIVER_TESTS=OFF -DSTEPDRIVER_PYTHON=ON &&
     cmake --build "$build/python" -j "$jobs" --target stepdriver_python
 }

@@ -228,10 +228,9 @@ tidy_all() {
 # Several files are read as one, as most of the time goes to the headers. clang can't read the headers
 # that gcc has precompiled.
 configure_tidy() {
-  local options=("$strict" -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12
-    -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
-  configure "$src/stepdriver_core" "$build/tidy/core" "${options[@]}" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
-    configure "$src" "$build/tidy/catkin" "${options[@]}" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
+  local options=("$strict" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
+  configure "$src/stepdriver_core" "$build/tidy/core" "$strict" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
+    configure "$src" "$build/tidy/catkin" "$strict" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
     cmake --build "$build/tidy/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp &&
     cp "$src/.clang-tidy" "$build/tidy/" &&
     cp "$src/test/.clang-tidy" "$build/tidy/core/test/" &&
@@ -279,7 +278,7 @@ build_core() {
   quietly core-build build_core_quietly
 }
 build_core_quietly() {
-  configure_core "${options[@]}" "-DSTEPDRIVER_BENCH=${thorough:-OFF}" "$(python_option)" &&
+  configure_core "$strict" "-DSTEPDRIVER_BENCH=${thorough:-OFF}" "$(python_option)" &&
     cmake --build "$build/core" -j "$jobs"
 }
 # The search takes more than half of the time of all these tests: usually it plays a part of its schedules.
@@ -353,7 +352,7 @@ build_gpiod2() {
 }
 
 build_node() {
-  quietly node-build build_catkin "${options[@]}" &&
+  quietly node-build build_catkin "$strict" &&
     quietly node-tests-build cmake --build "$build/catkin" -j "$jobs" --target tests
 }
 test_node() {
@@ -504,7 +503,7 @@ sanitize_node_tsan() {
   return "$status"
 }
 build_node_tests() {
-  configure_catkin "${options[@]}" && cmake --build "$build/catkin" -j "$jobs" --target "$@"
+  configure_catkin "$strict" && cmake --build "$build/catkin" -j "$jobs" --target "$@"
 }
 
 # Floods against a node. The figures are printed, and judged by hand: a test fails by what is wrong, never
@@ -559,9 +558,7 @@ install_packages core ccache "${wanted[@]}" "$(wants node && echo ros plots pane
 # shares only results of the same options.
 strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=OFF
 [[ $(c++ -dumpversion) != 12* ]] || strict=-DCMAKE_COMPILE_WARNING_AS_ERROR=ON
-# Several files are compiled as one, which takes half the time. Those of the core have the same path in each
-# build, seen from there, so that ccache compiles them once.
-options=("$strict" -DCMAKE_UNITY_BUILD=ON)
+# The core's files have the same path in each build, seen from there, so that ccache compiles them once.
 export CCACHE_BASEDIR=$build
 
 later=()  # what runs in the background

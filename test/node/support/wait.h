@@ -6,7 +6,7 @@
 namespace stepdriver::node_test {
 
 /// Longer than any successful step takes on a machine that stalls now and then.
-constexpr std::chrono::seconds kBound{20};
+constexpr std::chrono::seconds kBound{100};
 
 /// Waits for a condition. @return whether it came true within the bound.
 template <typename Condition>
