@@ -1023,10 +1023,11 @@ class StopChoice {
     return path_.withStops(stops);
   }
 
-  // Those at which a stop may be faster.
+  // Those at which a stop may be faster. There is no way to stop on if the motion begins at the end
+  // of the first segment.
   std::vector<std::size_t> cornersOf(const JerkLimitedSection& section) const {
     std::vector<std::size_t> corners;
-    for (std::size_t i = 0; i + 1 < path_.size(); ++i) {
+    for (std::size_t i = begin_.parameter > 1.0 - kNoPart ? 1 : 0; i + 1 < path_.size(); ++i) {
       if (path_.isSeparate(i) && section.mayStopAt(i)) corners.push_back(i);
     }
     return corners;

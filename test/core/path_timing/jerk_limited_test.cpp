@@ -343,6 +343,32 @@ TEST(JerkLimitedTiming, StopsAtCornersThatItCanNotPassFaster) {
                     {2, {40'000.0, 160'000.0, 160'000.0, 4e6}});
 }
 
+// What is appended to a path may begin in the middle of a corner, from where there is no way to a
+// stop at it.
+TEST(JerkLimitedTiming, BeginsInTheMiddleOfACorner) {
+  std::mt19937 random(37);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  int begun = 0;
+  for (int run = 0; run < 200; ++run) {
+    test::RandomPath drawn = test::randomPath(random);
+    for (TimingLimits& limit : drawn.limits) limit.jerk = limit.acceleration * 50.0;
+    const Path path = drawn.path(Continuity::kCurvature);
+    if (path.size() < 2 || path.blendAfter(0) == 0.0) continue;
+    motion::TimingStart begin;
+    begin.parameter = 1.0;
+    begin.speed = part(random) < 0.5 ? 1.0 : 100.0 * part(random);
+    const motion::PathTiming made = motion::planJerkLimited(path, drawn.limits, begin);
+    if (made.excess > 1.0 + 1e-3) continue;
+    ++begun;
+    ASSERT_FALSE(made.knots.empty()) << run;
+    PathPoint corner;
+    path.evaluate(0, 1.0, corner);
+    EXPECT_NEAR(made.knots.front().positions[0], corner.position[0], 1e-6) << run;
+    EXPECT_EQ(made.knots.back().segment, path.size() - 1) << run;
+  }
+  EXPECT_GT(begun, 20);
+}
+
 TEST(JerkLimitedTiming, IsNotSlowerThanWithStopsOnRandomPaths) {
   std::mt19937 random(2027);
   const auto number = [&](double low, double high) {
