@@ -42,8 +42,6 @@ std::string HomingToStall::unmet() const {
 }
 
 void HomingToStall::start() {
-  if (!axis_.sharers().empty())
-    return failNow("it shares its motors, and a stall is of one of them");
   if (const std::string limited = limitedSpeed(); !limited.empty()) return failNow(limited);
   enter(axis::HomingPhase::kSeeking, towards_);
   chip_.notePreparedForStall();

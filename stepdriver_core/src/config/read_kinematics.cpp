@@ -231,6 +231,12 @@ class KinematicsReader {
                                 "a turn of a motor, which the other axes turn too",
                                 axis.name));
     }
+    if (axis.homing->kind == HomingKind::kStall) {
+      issue("axes", fmt::format("has {}, whose homing/kind must not be stall: a stall is of one "
+                                "motor, and the others would move the axis on",
+                                axis.name));
+      return;
+    }
     const double unit = configUnitsPerUnit(axis.kind);
     if (const double restart = restartSpeed(axis); axis.homing->seek_speed > restart * kSlack) {
       issue("axes",

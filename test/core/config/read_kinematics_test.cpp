@@ -179,6 +179,44 @@ TEST(ReadKinematics, RefusesAHomingToAnIndexOfAMotorThatTheOtherAxisTurnsToo) {
                           "comes once a turn of a motor, which the other axes turn too"}));
 }
 
+TEST(ReadKinematics, RefusesAHomingToAStallOfAMotorThatTheOtherAxisTurnsToo) {
+  for (const std::string type : {"corexy", "differential"}) {
+    ConfigValue tree = coreXy();
+    put(tree, "kinematics/type", type);
+    int address = 0;
+    for (const std::string axis : {"axes/x", "axes/y"}) {
+      put(tree, axis + "/driver", "tmc2209");
+      put(tree, axis + "/tmc",
+          mapOf({{"port", "/dev/serial0"},
+                 {"address", address++},
+                 {"sense_resistor_mohm", 110.0},
+                 {"run_current_a", 0.8},
+                 {"stall_threshold", 60}}));
+    }
+    put(tree, "axes/x/homing",
+        mapOf({{"kind", "flag"},
+               {"towards", "max"},
+               {"input", "home"},
+               {"seek_speed_mm_s", 10.0},
+               {"latch_speed_mm_s", 1.0},
+               {"max_travel_mm", 100.0}}));
+    Lines lines;
+    read(tree, lines);
+    EXPECT_EQ(lines, Lines{});
+    put(tree, "axes/x/homing",
+        mapOf({{"kind", "stall"},
+               {"towards", "max"},
+               {"seek_speed_mm_s", 40.0},
+               {"pull_off_mm", 20.0},
+               {"offset_mm", 0.0},
+               {"max_travel_mm", 100.0}}));
+    read(tree, lines);
+    EXPECT_EQ(lines,
+              (Lines{"/kinematics/axes: has x, whose homing/kind must not be stall: a stall is of "
+                     "one motor, and the others would move the axis on"}));
+  }
+}
+
 TEST(ReadKinematics, RefusesTopSpeedsThatADriverCantStepTogether) {
   ConfigValue tree = coreXy();
   for (const std::string axis : {"x", "y"}) {
