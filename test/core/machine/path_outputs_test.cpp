@@ -6,11 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -739,100 +735,6 @@ TEST_F(PathOutputs, AHundredThousandMarksOfAPathInParts) {
     ASSERT_LE(std::abs(times[i] - step.time_ns), 1) << i;
   }
 }
-
-// ---- random motions ----
-
-// Random places, and random holds, overrides and stops at random times. The oracle knows only the
-// path's places, what the call reported, and the rig's trace: the n-th change of a line comes with
-// the step to its n-th place, and there are as many as were reported. STEPDRIVER_MOTIONS is the
-// number of motions of each seed, for long runs by hand.
-class RandomPathOutputs : public PathOutputs, public testing::WithParamInterface<int> {
- protected:
-  double unit() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
-  std::int64_t whole(std::int64_t least, std::int64_t most) {
-    return std::uniform_int_distribution<std::int64_t>(least, most)(random_);
-  }
-  void seed(unsigned number) { random_.seed(number); }
-
-  std::mt19937 random_;
-  int marks_ = 0;
-  int exact_ = 0;
-};
-
-TEST_P(RandomPathOutputs, EachMarkComesOnceAtItsNanosecondOrIsReported) {
-  const char* const wanted = std::getenv("STEPDRIVER_MOTIONS");
-  const int runs = wanted != nullptr ? std::atoi(wanted) : 40;
-  for (int run = 0; run < runs; ++run) {
-    const auto number = static_cast<unsigned>(GetParam() * 10'000 + run);
-    SCOPED_TRACE(number);
-    seed(number);
-    begin();
-    std::vector<std::int64_t> counts;
-    std::int64_t count = 0;
-    const auto marks = whole(2, 40);
-    for (std::int64_t i = 0; i <= marks; ++i) {
-      counts.push_back(count += whole(1, unit() < 0.3 ? 5 : 400));
-    }
-    const CoordinatedMove move = followPath(dashes(counts));
-    bool is_safe = false;
-    const auto disturb = [&] {
-      const double what = unit();
-      if (what < 0.5) {
-        machine().setSpeedOverride(0.05 + 0.95 * unit());
-      } else if (what < 0.9) {
-        machine().hold();
-        if (unit() < 0.7) advance(0.3 * unit());
-        machine().resume();
-      } else if (what < 0.94) {
-        machine().stop();
-      } else if (what < 0.97) {
-        is_safe = true;
-        machine().emergencyStop();
-      } else {
-        bench->axis("y").stop();
-      }
-    };
-    for (int i = 0; i < 8 && !machine().result(move); ++i) {
-      advance(0.1 * unit() * unit());
-      test::refusal(disturb);
-    }
-    const CoordinatedResult result = machine().wait(move);
-    ASSERT_EQ(result.marks_made + result.marks_not_made, counts.size() - 1) << result.message;
-    if (result.end == MoveEnd::kReached) {
-      ASSERT_EQ(result.marks_not_made, 0U);
-    }
-    advance(0.2);
-    std::vector<std::int64_t> times = edges();
-    if (is_safe && result.marks_made % 2 == 1) {
-      ASSERT_EQ(times.size(), result.marks_made + 1) << "to its safe state";
-      times.pop_back();
-    }
-    ASSERT_EQ(times.size(), result.marks_made);
-    const auto passed = static_cast<std::int64_t>(steps("x").size());
-    const std::vector<std::int64_t> planned = timesOfSteps(counts);
-    const std::vector<Step> all = steps("x");
-    for (std::size_t i = 0; i < times.size(); ++i) {
-      // While the rate changes, the steps are within a hundredth of a microstep of the path.
-      const auto step = static_cast<std::size_t>(counts[i]) - 1;
-      const auto since = [&](std::size_t later) {
-        return later > 0 && later < all.size() ? all[later].time_ns - all[later - 1].time_ns : 0;
-      };
-      const std::int64_t interval = std::max(since(step), since(step + 1));
-      ASSERT_LE(std::abs(times[i] - planned[i]), 1 + interval / 100)
-          << "mark " << i << " at count " << counts[i];
-      ++marks_;
-      exact_ += std::abs(times[i] - planned[i]) <= 1 ? 1 : 0;
-    }
-    if (result.marks_not_made > 0) {
-      ASSERT_LE(passed, counts[result.marks_made]) << "it was passed, and not made";
-    }
-  }
-  RecordProperty("marks", marks_);
-  RecordProperty("exact", exact_);
-  EXPECT_GT(exact_, 0.9 * marks_);
-}
-
-INSTANTIATE_TEST_SUITE_P(Seeds, RandomPathOutputs, testing::Range(0, 8));
 
 }  // namespace
 }  // namespace stepdriver
