@@ -21,13 +21,16 @@
 #include <stepdriver/SetCurrent.h>
 #include <stepdriver/SetLimits.h>
 #include <stepdriver/SetOutput.h>
+#include <stepdriver/SetOutputValue.h>
 #include <stepdriver/SetPosition.h>
 #include <stepdriver/SetPositionCompare.h>
 #include <stepdriver/SpeedOverride.h>
 #include <trajectory_msgs/JointTrajectory.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <numeric>
 #include <type_traits>
@@ -120,6 +123,9 @@ DriverTopics::DriverTopics(const std::string& node, RequestLog& log) : log_(log)
       handle.advertise<actionlib_msgs::GoalID>("follow_joint_trajectory/cancel", 100);
   latch_goal_ = handle.advertise<LatchActionGoal>("latch/goal", 100);
   latch_cancel_ = handle.advertise<actionlib_msgs::GoalID>("latch/cancel", 100);
+  for (const std::string& output : kOutputs) {
+    outputs_.push_back(handle.advertise<std_msgs::Float64>("outputs/" + output, 100));
+  }
   setpoints_ = handle.advertise<std_msgs::Float64MultiArray>("setpoint", 100);
   for (const std::string& axis : kAxisNames) {
     setpoint_.push_back(handle.advertise<std_msgs::Float64>(axis + "/setpoint", 100));
@@ -133,6 +139,7 @@ bool DriverTopics::connected() const {
   return heard(jog_) && heard(setpoints_) && heard(command_) && heard(trajectory_goal_) &&
          heard(trajectory_cancel_) && heard(latch_goal_) && heard(latch_cancel_) &&
          std::all_of(setpoint_.begin(), setpoint_.end(), heard) &&
+         std::all_of(outputs_.begin(), outputs_.end(), heard) &&
          std::all_of(move_goals_.begin(), move_goals_.end(), heard) &&
          std::all_of(move_cancels_.begin(), move_cancels_.end(), heard);
 }
@@ -238,22 +245,38 @@ void DriverTopics::cancelMove(std::size_t axis) {
   move_cancels_.at(axis).publish(actionlib_msgs::GoalID());
 }
 
-void DriverTopics::latch(int client, bool every) {
+void DriverTopics::latch(int client, bool every, const std::optional<WindowOrder>& window) {
   LatchActionGoal goal;
   goal.goal.input = kInput;
   goal.goal.edge = LatchGoal::EITHER;
   goal.goal.every = every;
   Request request = messageOf(client, 0U, every ? "latch of every edge" : "latch");
   request.kind = Kind::kOther;
+  if (window) {
+    goal.goal.window_axis = kAxisNames.at(window->axis);
+    goal.goal.window_from = window->from;
+    goal.goal.window_to = window->to;
+    request.window = window;
+    request.text += " in a window of " + kAxisNames.at(window->axis);
+  }
   goal.goal_id.id = std::to_string(log_.begin(request));
   latch_goal_.publish(goal);
 }
 
+void DriverTopics::output(int client, std::size_t output, double value) {
+  Request request = messageOf(client, 0U, "outputs/" + kOutputs.at(output) + " " + shown(value));
+  request.kind = Kind::kOther;
+  log_.begin(request);
+  std_msgs::Float64 message;
+  message.data = value;
+  outputs_.at(output).publish(message);
+}
+
 void DriverTopics::cancelLatches() { latch_cancel_.publish(actionlib_msgs::GoalID()); }
 
-template <typename Service, typename Arrivals>
+template <typename Service, typename Reader>
 bool DriverCalls::call(Request request, const std::string& service, Service& call,
-                       const Arrivals& arrivals) {
+                       const Reader& answer) {
   request.client = client_;
   const std::size_t index = log_.begin(std::move(request));
   ros::ServiceClient& client = clients_[service];
@@ -263,15 +286,14 @@ bool DriverCalls::call(Request request, const std::string& service, Service& cal
   // A node that has died doesn't answer.
   if (!client.call(call)) return false;
   const bool success = call.response.success != 0;
-  log_.end(index, success, call.response.message,
-           success ? arrivals(call.response) : std::vector<Arrival>());
+  log_.end(index, success, call.response.message, success ? answer(call.response) : Answer());
   return success;
 }
 
 template <typename Service>
 bool DriverCalls::call(Request request, const std::string& service, Service& call) {
   return this->call(std::move(request), service, call,
-                    [](const auto& /*response*/) { return std::vector<Arrival>(); });
+                    [](const auto& /*response*/) { return Answer(); });
 }
 
 bool DriverCalls::moveTo(std::size_t axis, double position, bool relative, bool wait) {
@@ -284,8 +306,9 @@ bool DriverCalls::moveTo(std::size_t axis, double position, bool relative, bool 
                                   name + (relative ? " by " : " ") + shown(position), wait),
                         axis, position, relative),
               name, service, [&](const MoveTo::Response& response) {
-                if (relative || !wait) return std::vector<Arrival>();
-                return std::vector<Arrival>{{axis, position, response.position}};
+                Answer answer;
+                if (!relative && wait) answer.arrivals = {{axis, position, response.position}};
+                return answer;
               });
 }
 
@@ -316,39 +339,80 @@ bool DriverCalls::moveLine(const std::vector<std::size_t>& axes,
     request = leadingTo(std::move(request), axes[i], positions[i], relative);
   }
   return call(std::move(request), "move_line", service, [&](const MoveLine::Response& response) {
-    std::vector<Arrival> arrivals;
-    if (relative || !wait) return arrivals;
+    Answer answer;
+    if (relative || !wait) return answer;
     for (std::size_t i = 0; i < axes.size(); ++i) {
-      arrivals.push_back({axes[i], positions[i], response.position.at(i)});
+      answer.arrivals.push_back({axes[i], positions[i], response.position.at(i)});
     }
-    return arrivals;
+    return answer;
   });
 }
 
 namespace {
 
-std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size, bool switches) {
+constexpr double kLeadOn = 0.02;   // [s]
+constexpr double kLeadOff = 0.01;  // [s]
+
+/// A place on a segment of a path.
+struct OnTheWay {
+  std::size_t segment;
+  double part;  // of its length
+  bool on;
+};
+// Corners are rounded within half of a segment at most.
+constexpr std::array<OnTheWay, 4> kOnTheWay{
+    {{0, 0.5, true}, {1, 0.5, false}, {2, 0.5, true}, {2, 0.75, false}}};
+
+std::vector<stepdriver::PathSegment> zigzag(std::size_t axes, double size,
+                                            DriverCalls::Marks marks) {
   std::vector<stepdriver::PathSegment> segments(3);
-  for (std::size_t i = 1; switches && i < segments.size(); ++i) {
-    segments[i].outputs.resize(1);
-    segments[i].outputs[0].name = kPathOutput;
-    segments[i].outputs[0].on = i == 1;
-  }
+  const auto add = [](stepdriver::PathSegment& segment, bool on, double distance) {
+    stepdriver::OutputSwitch output;
+    output.name = kPathOutput;
+    output.on = on ? 1 : 0;
+    output.distance = distance;
+    segment.outputs.push_back(output);
+  };
+  std::vector<double> begin(axes, 0.0);
   for (std::size_t i = 0; i < segments.size(); ++i) {
+    double length = 0.0;
     for (std::size_t axis = 0; axis < axes; ++axis) {
       segments[i].end.push_back((i + axis) % 2 == 0 ? size : -size / 2.0);
+      length = std::hypot(length, segments[i].end.back() - begin[axis]);
+    }
+    begin = segments[i].end;
+    if (marks == DriverCalls::Marks::kAtCorners && i > 0) add(segments[i], i == 1, 0.0);
+    if (marks != DriverCalls::Marks::kOnTheWay) continue;
+    for (const OnTheWay& place : kOnTheWay) {
+      if (place.segment == i) add(segments[i], place.on, place.part * length);
     }
   }
   return segments;
 }
 
+/// The places of Marks::kOnTheWay.
+std::vector<MarkOrder> marksOf(const std::vector<stepdriver::PathSegment>& segments) {
+  std::vector<MarkOrder> marks;
+  for (const OnTheWay& place : kOnTheWay) {
+    MarkOrder& mark = marks.emplace_back();
+    mark.output = kPathOutputIndex;
+    mark.on = place.on;
+    mark.lead = place.on ? kLeadOn : kLeadOff;
+    for (std::size_t axis = 0; axis < segments.front().end.size(); ++axis) {
+      const double begin = place.segment == 0 ? 0.0 : segments[place.segment - 1].end[axis];
+      mark.position.push_back(begin + place.part * (segments[place.segment].end[axis] - begin));
+    }
+  }
+  return marks;
+}
+
 }  // namespace
 
 std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, double size,
-                                      bool more_follows, double velocity, bool switches) {
+                                      bool more_follows, double velocity, Marks marks) {
   stepdriver::FollowPath service;
   for (const std::size_t axis : axes) service.request.name.push_back(kAxisNames.at(axis));
-  service.request.segments = zigzag(axes.size(), size, switches);
+  service.request.segments = zigzag(axes.size(), size, marks);
   service.request.relative = true;
   service.request.tolerance = 0.0005;
   service.request.velocity = velocity;
@@ -356,6 +420,15 @@ std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, doub
   Request request = requestOf(Kind::kMotion, setOf(axes),
                               "follow_path of " + shown(size) + " at " + shown(velocity), false);
   request.is_path = true;
+  if (marks == Marks::kOnTheWay) {
+    stepdriver::OutputLead lead;
+    lead.name = kPathOutput;
+    lead.on = kLeadOn;
+    lead.off = kLeadOff;
+    service.request.leads.push_back(lead);
+    request.path_axes = axes;
+    request.marks = marksOf(service.request.segments);
+  }
   for (const std::size_t axis : axes) {
     // A corner is rounded on the inside, and the path may deviate by its tolerance.
     request.reaches.push_back({axis, std::min(size, -size / 2.0) - service.request.tolerance,
@@ -364,16 +437,16 @@ std::uint64_t DriverCalls::followPath(const std::vector<std::size_t>& axes, doub
   std::uint64_t path = 0;
   call(request, "follow_path", service, [&path](const stepdriver::FollowPath::Response& response) {
     path = response.path;
-    return std::vector<Arrival>();
+    return Answer();
   });
   return path;
 }
 
 bool DriverCalls::appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
-                             bool more_follows, bool switches) {
+                             bool more_follows, Marks marks) {
   stepdriver::AppendPath service;
   service.request.path = path;
-  service.request.segments = zigzag(axes.size(), size, switches);
+  service.request.segments = zigzag(axes.size(), size, marks);
   service.request.more_follows = more_follows;
   return call(requestOf(Kind::kOther, 0U, "append_path of " + shown(size), false), "append_path",
               service);
@@ -393,7 +466,13 @@ bool DriverCalls::probe(std::size_t axis, double position, bool away, bool twice
   service.request.go_back = returns;
   Request request = requestOf(Kind::kMotion, 1U << axis,
                               "probe " + kAxisNames.at(axis) + " " + shown(position), true);
-  return call(leadingTo(std::move(request), axis, position, false), "probe", service);
+  request.probe = ProbeOrder{axis, !away};
+  return call(leadingTo(std::move(request), axis, position, false), "probe", service,
+              [](const Probe::Response& response) {
+                Answer answer;
+                if (response.contact != 0) answer.contact = response.contact_position.front();
+                return answer;
+              });
 }
 
 bool DriverCalls::setOutput(std::size_t output, bool on) {
@@ -404,6 +483,16 @@ bool DriverCalls::setOutput(std::size_t output, bool on) {
       requestOf(Kind::kOther, 0U, "set_output " + kOutputs.at(output) + (on ? " on" : " off"));
   request.output = OutputOrder{output, on};
   return call(std::move(request), "set_output", service);
+}
+
+bool DriverCalls::setOutputValue(std::size_t output, double value) {
+  SetOutputValue service;
+  service.request.name = kOutputs.at(output);
+  service.request.value = value;
+  Request request =
+      requestOf(Kind::kOther, 0U, "set_output_value " + kOutputs.at(output) + " " + shown(value));
+  request.output = OutputOrder{output, value > 0.0};
+  return call(std::move(request), "set_output_value", service);
 }
 
 bool DriverCalls::home(std::size_t axis, bool wait) {
@@ -458,16 +547,45 @@ bool DriverCalls::setCurrent(std::size_t axis, double run, double hold) {
               name, service);
 }
 
-bool DriverCalls::compare(std::size_t axis, double from, double to) {
+bool DriverCalls::compareCam(std::size_t axis, double from, double to, double lead) {
   SetPositionCompare service;
   service.request.output = kComparedOutput;
   service.request.axis = kAxisNames.at(axis);
   service.request.cam_begin = {from};
   service.request.cam_end = {to};
-  return call(requestOf(Kind::kOther, 0,
-                        "set_position_compare " + kAxisNames.at(axis) + " " + shown(from) + " " +
-                            shown(to)),
-              "set_position_compare", service);
+  service.request.lead_on = lead;
+  Request request = requestOf(
+      Kind::kOther, 0,
+      "set_position_compare " + kAxisNames.at(axis) + " from " + shown(from) + " to " + shown(to));
+  request.compare.emplace();
+  return call(std::move(request), "set_position_compare", service);
+}
+
+bool DriverCalls::comparePulses(const CompareOrder& order) {
+  SetPositionCompare service;
+  service.request.output = kComparedOutput;
+  service.request.axis = kAxisNames.at(order.axis);
+  service.request.direction = static_cast<std::int8_t>(order.direction);
+  service.request.distance = order.distance;
+  service.request.begin = order.begin;
+  service.request.end = order.end;
+  service.request.pulse = order.pulse;
+  Request request =
+      requestOf(Kind::kOther, 0,
+                "set_position_compare " + kAxisNames.at(order.axis) + " each " +
+                    shown(order.distance) + " from " + shown(order.begin) + " to " +
+                    shown(order.end) + " in direction " + std::to_string(order.direction));
+  request.compare = order;
+  request.compare->has_pulses = true;
+  return call(std::move(request), "set_position_compare", service);
+}
+
+bool DriverCalls::clearCompare() {
+  SetPositionCompare service;
+  service.request.output = kComparedOutput;
+  Request request = requestOf(Kind::kOther, 0, "set_position_compare of no axis");
+  request.compare.emplace();
+  return call(std::move(request), "set_position_compare", service);
 }
 
 bool DriverCalls::speedOverride(double factor) {

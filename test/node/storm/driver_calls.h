@@ -6,6 +6,7 @@
 
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,8 +33,11 @@ class DriverTopics {
   void cancelTrajectories();
   void moveByAction(int client, std::size_t axis, double position, bool relative);
   void cancelMove(std::size_t axis);
-  /// Positions of the axes, x first, at the edges of the input kInput.
-  void latch(int client, bool every);
+  /// Positions of the axes, x first, at the edges of the input kInput; in a window, if there is
+  /// one.
+  void latch(int client, bool every, const std::optional<WindowOrder>& window);
+  /// A message of the topic of an output. @param output its number in kOutputs
+  void output(int client, std::size_t output, double value);
   void cancelLatches();
 
   /// Whether the node subscribes to all of them.
@@ -59,6 +63,7 @@ class DriverTopics {
   std::vector<ros::Publisher> move_cancels_;
   ros::Publisher latch_goal_;
   ros::Publisher latch_cancel_;
+  std::vector<ros::Publisher> outputs_;
   ros::Publisher setpoints_;
   std::vector<ros::Publisher> setpoint_;
   std::map<std::size_t, JogMessage> jogs_;              // the last message of each axis
@@ -76,19 +81,27 @@ class DriverCalls {
   bool moveRounds(std::size_t axis, double rounds, bool wait);
   bool moveLine(const std::vector<std::size_t>& axes, const std::vector<double>& positions,
                 bool relative, double duration, bool wait);
+  /// Where a path switches the output kPathOutput.
+  enum class Marks {
+    kNone,
+    kAtCorners,  ///< on for its second line
+    /// On from the middle of its first line to that of the second one, and in the last one, with
+    /// lead times: the oracle knows the places.
+    kOnTheWay,
+  };
   /// A zigzag of three lines around the positions of the axes.
   ///
-  /// @param velocity [m/s] 0: the highest @param switches the second line has the output
-  ///   kPathOutput on
+  /// @param velocity [m/s] 0: the highest
   /// @return its number; 0: refused
   std::uint64_t followPath(const std::vector<std::size_t>& axes, double size, bool more_follows,
-                           double velocity = 0.0, bool switches = false);
+                           double velocity = 0.0, Marks marks = Marks::kNone);
   bool appendPath(std::uint64_t path, const std::vector<std::size_t>& axes, double size,
-                  bool more_follows, bool switches);
+                  bool more_follows, Marks marks);
   /// Until the input kInput tells of a contact, or its end.
   bool probe(std::size_t axis, double position, bool away, bool twice, bool returns);
   /// @param output its number in kOutputs
   bool setOutput(std::size_t output, bool on);
+  bool setOutputValue(std::size_t output, double value);
   bool home(std::size_t axis, bool wait);
   bool homeAll(bool wait);
   bool microstep(std::size_t axis, int microsteps);
@@ -96,8 +109,13 @@ class DriverCalls {
   bool setPosition(std::size_t axis, double position);
   /// [A rms]
   bool setCurrent(std::size_t axis, double run, double hold);
-  /// The position of an axis switches the output kComparedOutput: it is on between two places.
-  bool compare(std::size_t axis, double from, double to);
+  /// The position of an axis switches the output kComparedOutput: it is on between two places,
+  /// and is switched earlier by a lead [s].
+  bool compareCam(std::size_t axis, double from, double to, double lead);
+  /// The same with pulses.
+  bool comparePulses(const CompareOrder& order);
+  /// The position of no axis does.
+  bool clearCompare();
   bool speedOverride(double factor);
   /// Calls of std_srvs/SetBool for an axis: enable, sleep; press_min and press_max of the rig.
   bool set(Kind kind, std::size_t axis, const std::string& service, bool data);
@@ -105,9 +123,9 @@ class DriverCalls {
   bool trigger(Kind kind, AxisSet axes, const std::string& service);
 
  private:
-  /// @param arrivals reads from an answer the positions of axes that had a target.
-  template <typename Service, typename Arrivals>
-  bool call(Request request, const std::string& service, Service& call, const Arrivals& arrivals);
+  /// @param answer reads from an answer the positions of axes that had a target, and a contact.
+  template <typename Service, typename Reader>
+  bool call(Request request, const std::string& service, Service& call, const Reader& answer);
   template <typename Service>
   bool call(Request request, const std::string& service, Service& call);
 
@@ -121,8 +139,16 @@ extern const std::vector<std::string> kAxisNames;
 constexpr AxisSet kAllAxes = 7;
 constexpr const char* kComparedOutput = "tool";
 constexpr const char* kPathOutput = "pen";
-/// The third one only set_output switches.
-const std::vector<std::string> kOutputs{kComparedOutput, kPathOutput, "pump"};
+/// Only requests switch it; it has least times and a longest one.
+constexpr const char* kTimedOutput = "pump";
+constexpr double kMaxOn = 0.8;    // [s]
+constexpr double kMinOn = 0.03;   // [s]
+constexpr double kMinOff = 0.04;  // [s]
+/// A PWM output.
+constexpr const char* kPwmOutput = "laser";
+const std::vector<std::string> kOutputs{kComparedOutput, kPathOutput, kTimedOutput, kPwmOutput};
+constexpr std::size_t kPathOutputIndex = 1;
+constexpr std::size_t kPwmOutputIndex = 3;
 /// The carriage of x presses it.
 constexpr const char* kInput = "probe";
 

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <deque>
 #include <limits>
 #include <utility>
+
+#include "storm/joints.h"
+#include "storm/places.h"
+#include "storm/text.h"
 
 namespace stepdriver::storm {
 namespace {
@@ -20,6 +23,8 @@ constexpr double kStopMargin = 1.1;
 constexpr double kTrajectoryStops = 2.0;
 constexpr double kPathStops = 3.0;
 constexpr std::int64_t kLongestTrajectory = 20'000 * kMillisecond;
+/// Until a line is written whose time has come.
+constexpr std::int64_t kLateWrite = 20 * kMillisecond;
 constexpr double kPositionError = 0.05;  // [1/16 steps]
 /// Half a step of the coarsest mode in use, and a margin.
 constexpr double kArrivalError = 1.05;  // [1/16 steps]
@@ -27,12 +32,6 @@ constexpr double kArrivalError = 1.05;  // [1/16 steps]
 constexpr double kWayError = 3.05;  // [1/16 steps]
 
 double inSeconds(std::int64_t time) { return static_cast<double>(time) * 1e-9; }
-
-std::string formatted(const char* format, double number) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, number);
-  return text;
-}
 
 /// The time in which a motion may send pulses, on the rig's clock.
 struct Span {
@@ -74,7 +73,6 @@ class Stalls {
 struct AxisRequests {
   std::vector<std::int64_t> trajectories;  // times at which trajectories were sent
   std::vector<std::int64_t> paths;         // and paths
-  std::vector<const Request*> renamings;   // requests that may change the origin of its positions
 };
 
 /// Requests are in the order in which they were sent. Each lookup uses only requests near the time
@@ -85,15 +83,13 @@ class Judge {
       : seen_(observation),
         stalls_(observation.stalls),
         clock_(observation.clock),
+        joints_(observation, clock_),
         of_axis_(observation.axes.size()) {
     for (const Request& request : seen_.requests) {
       for (std::size_t axis = 0; axis < of_axis_.size(); ++axis) {
         if (!isOf(request, axis)) continue;
         if (request.is_trajectory) of_axis_[axis].trajectories.push_back(request.sent);
         if (request.is_path) of_axis_[axis].paths.push_back(request.sent);
-        if (request.kind == Kind::kSetPosition || request.kind == Kind::kHoming) {
-          of_axis_[axis].renamings.push_back(&request);
-        }
       }
     }
   }
@@ -113,7 +109,10 @@ class Judge {
       }
     }
     judgePositions();
-    for (const Latched& latched : seen_.latched) judgeLatched(latched);
+    for (std::size_t output = 0; output < seen_.outputs.size(); ++output) judgeTimes(output);
+    for (std::string& broken : brokenPlaces(seen_, clock_, joints_)) {
+      broken_.push_back(std::move(broken));
+    }
     for (std::size_t i = 1; i < seen_.rests.size(); ++i) {
       for (std::size_t axis = 0; axis < seen_.axes.size(); ++axis) {
         judgeWay(axis, seen_.rests[i - 1], seen_.rests[i]);
@@ -325,6 +324,34 @@ class Judge {
                       requestsAround(request.sent, *request.answered));
   }
 
+  void judgeTimes(std::size_t output) {
+    const OutputFacts& facts = seen_.outputs[output];
+    const std::vector<Switch>& switches = seen_.switches.at(output);
+    if (!facts.is_timed) return;
+    for (std::size_t i = 1; i < switches.size(); ++i) {
+      const std::int64_t time = switches[i].time;
+      const std::int64_t length = time - switches[i - 1].time;
+      // The end of the node switches it off.
+      if (time > seen_.clock.back().rig) return;
+      const bool is_too_long = !switches[i].on && length > facts.max_on + kLateWrite;
+      const std::int64_t least = switches[i].on ? facts.min_off : facts.min_on;
+      const bool is_too_short = length < least && (switches[i].on || !maybeSafeAt(time));
+      if (!is_too_long && !is_too_short) continue;
+      const std::int64_t shown = clock_.whenItShows(time);
+      broken_.push_back("the output " + facts.name + " was " + (switches[i].on ? "off" : "on") +
+                        " for " + formatted("%.4f s", inSeconds(length)) +
+                        "; requests:" + requestsAround(shown, shown));
+    }
+  }
+
+  /// Whether an emergency stop may have switched the outputs at this time of the rig's clock.
+  bool maybeSafeAt(std::int64_t rig) const {
+    return std::any_of(seen_.requests.begin(), seen_.requests.end(), [&](const Request& request) {
+      return request.kind == Kind::kEmergencyStop && clock_.earliestAt(request.sent) <= rig &&
+             (!request.answered || clock_.latestAt(*request.answered) >= rig);
+    });
+  }
+
   void judgeSafety(const Request& stop, const std::vector<Switch>& switches) {
     const std::int64_t begin = clock_.latestAt(*stop.answered);
     std::int64_t end = kForever;
@@ -354,7 +381,7 @@ class Judge {
   }
 
   void judgeArrivals(const Request& request) {
-    for (const Arrival& arrival : request.arrivals) {
+    for (const Arrival& arrival : request.answer.arrivals) {
       const AxisFacts& facts = seen_.axes.at(arrival.axis);
       const double error = (arrival.told - arrival.wanted) * facts.steps_per_metre;
       if (std::abs(error) <= kArrivalError) continue;
@@ -363,25 +390,8 @@ class Judge {
     }
   }
 
-  /// Whether the origin of the position may have changed between two times.
-  bool mayBeRenamed(std::size_t axis, std::int64_t begin, std::int64_t end) const {
-    const auto& renamings = of_axis_[axis].renamings;
-    return std::any_of(renamings.begin(), renamings.end(), [&](const Request* request) {
-      return request->sent < end && (!request->answered || *request->answered > begin);
-    });
-  }
-
   std::int64_t countAt(std::size_t axis, std::int64_t time) const {
-    return countShown(axis, clock_.latestAt(time));
-  }
-
-  /// When the rig's clock shows this.
-  std::int64_t countShown(std::size_t axis, std::int64_t rig) const {
-    const auto& pulses = seen_.pulses[axis];
-    const auto after =
-        std::upper_bound(pulses.begin(), pulses.end(), rig,
-                         [](std::int64_t t, const Pulse& pulse) { return t < pulse.time; });
-    return after == pulses.begin() ? 0 : std::prev(after)->count;
+    return joints_.countShown(axis, clock_.latestAt(time));
   }
 
   void judgePositions() {
@@ -390,7 +400,7 @@ class Judge {
       const RestPoint* anchor = nullptr;
       const RestPoint* last = nullptr;
       for (const RestPoint& rest : seen_.rests) {
-        if (anchor == nullptr || mayBeRenamed(axis, last->time, rest.time)) {
+        if (anchor == nullptr || joints_.mayBeRenamed(axis, last->time, rest.time)) {
           anchor = last = &rest;
           continue;
         }
@@ -407,32 +417,6 @@ class Judge {
         anchor = &rest;
       }
     }
-  }
-
-  // The edge may be any of those since the last rest; a message is under way for less than a
-  // second.
-  void judgeLatched(const Latched& latched) {
-    constexpr std::int64_t kUnderWay = 1000 * kMillisecond;
-    const auto rest = std::find_if(
-        seen_.rests.rbegin(), seen_.rests.rend(),
-        [&](const RestPoint& point) { return point.time < latched.received - kUnderWay; });
-    if (rest == seen_.rests.rend() || mayBeRenamed(0, rest->time, latched.received)) return;
-    const AxisFacts& facts = seen_.axes.front();
-    const double told = (latched.position - rest->positions.front()) * facts.steps_per_metre;
-    const std::int64_t begin = clock_.earliestAt(rest->time) - kUnderWay;
-    const std::int64_t end = clock_.latestAt(latched.received);
-    const bool is_there =
-        std::any_of(seen_.input.begin(), seen_.input.end(), [&](const Switch& edge) {
-          if (edge.on != latched.active || edge.time < begin || edge.time > end) return false;
-          const auto counted =
-              static_cast<double>(countShown(0, edge.time) - countAt(0, rest->time));
-          return std::abs(told - counted) <= kWayError + facts.backlash * facts.steps_per_metre;
-        });
-    if (is_there) return;
-    broken_.push_back(facts.name + ": a latch tells of an edge at " +
-                      formatted("%.5f m", latched.position) +
-                      ", where the input has none; requests:" +
-                      requestsAround(latched.received, latched.received));
   }
 
   struct Way {
@@ -468,7 +452,7 @@ class Judge {
   }
 
   void judgeWay(std::size_t axis, const RestPoint& from, const RestPoint& to) {
-    if (mayBeRenamed(axis, from.time, to.time)) return;
+    if (joints_.mayBeRenamed(axis, from.time, to.time)) return;
     const AxisFacts& facts = seen_.axes[axis];
     const std::int64_t before = countAt(axis, from.time);
     std::int64_t lowest = before;
@@ -501,6 +485,7 @@ class Judge {
   const Observation& seen_;
   const Stalls stalls_;
   const RigClock clock_;
+  const Joints joints_;
   std::vector<AxisRequests> of_axis_;
   std::vector<std::string> broken_;
 };

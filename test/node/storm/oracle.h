@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -31,17 +32,30 @@ struct Switch {
   bool on = false;
 };
 
+/// What an output promises.
+struct OutputFacts {
+  std::string name;
+  /// [ns] How long it is on at most, and on and off at least; only if `is_timed`.
+  bool is_timed = false;
+  std::int64_t max_on = 0;
+  std::int64_t min_on = 0;
+  std::int64_t min_off = 0;
+};
+
 /// An edge of the input that the first axis presses, as a latch tells it.
 struct Latched {
   std::int64_t received = 0;  ///< [ns] of CLOCK_MONOTONIC
+  std::size_t request = 0;    ///< the number of the latch in Observation::requests
   bool active = false;
-  double position = 0.0;  ///< [m] of the first axis
+  std::vector<double> positions;  ///< [m] of each axis
 };
 
 /// A moment at which every axis was at rest, and what the node said then.
 struct RestPoint {
   std::int64_t time = 0;          ///< [ns] of CLOCK_MONOTONIC
   std::vector<double> positions;  ///< [m] of each axis
+  std::vector<bool> valid;  ///< of each axis: its position can be trusted, and it has no fault
+  bool alone = false;       ///< since the rest before it, at most one motion was asked for
 };
 
 /// A time in which this computer didn't run what was ready to run.
@@ -55,6 +69,7 @@ struct Observation {
   std::vector<AxisFacts> axes;
   std::vector<Request> requests;
   std::vector<std::vector<Pulse>> pulses;     ///< those of each axis
+  std::vector<OutputFacts> outputs;           ///< a position switches the first one
   std::vector<std::vector<Switch>> switches;  ///< of each output, from off on, in their order
   std::vector<Switch> input;                  ///< changes of the input of the latches
   std::vector<Latched> latched;
@@ -71,9 +86,11 @@ struct Observation {
 ///   any longer.
 /// - From the answer of an emergency stop until a newer recover can have come, all outputs are off.
 /// - If an answer says that an output was switched, it was so between the request and the answer.
+/// - An output with least times and a longest one keeps them, except that its safe state doesn't
+///   wait for its least time on.
 /// - If an answer says that a position was reached, it was reached.
-/// - The reported position is the count of the pulses. So is a latched one, at an edge of the
-/// input.
+/// - The reported position is the count of the pulses.
+/// - Places: see brokenPlaces().
 /// - Pulses never lead an axis beyond its soft limits. If only one request for motion comes between
 ///   two moments of rest, they never leave the way that this request describes.
 ///

@@ -49,19 +49,22 @@ class OneAxis {
 
   void move(std::int64_t begin, std::int64_t end) {
     for (std::int64_t time = begin; time < end; ++time) {
-      seen_.pulses[0].push_back(
-          {time * kMs, static_cast<std::int64_t>(seen_.pulses[0].size()) + 1});
+      seen_.pulses[0].push_back({time * kMs, count() + 1});
     }
   }
-  /// A pulse each millisecond, that many forward and as many back.
-  void moveAndReturn(std::int64_t begin, std::int64_t count) {
-    const auto before = static_cast<std::int64_t>(seen_.pulses[0].size());
-    for (std::int64_t i = 1; i <= 2 * count; ++i) {
-      seen_.pulses[0].push_back({(begin + i) * kMs, before + (i <= count ? i : 2 * count - i)});
+  /// A pulse each millisecond, that many forward, or if it is negative backward, and as many back.
+  void moveAndReturn(std::int64_t begin, std::int64_t steps) {
+    const std::int64_t before = count();
+    const std::int64_t way = steps < 0 ? -1 : 1;
+    for (std::int64_t i = 1; i <= 2 * way * steps; ++i) {
+      seen_.pulses[0].push_back(
+          {(begin + i) * kMs, before + way * (i <= way * steps ? i : 2 * way * steps - i)});
     }
   }
   void ask(const Request& request) { seen_.requests.push_back(request); }
-  void rest(std::int64_t time, double position) { seen_.rests.push_back({time * kMs, {position}}); }
+  void rest(std::int64_t time, double position, bool alone = false) {
+    seen_.rests.push_back({time * kMs, {position}, {true}, alone});
+  }
   void stall(std::int64_t begin, std::int64_t end) {
     seen_.stalls.push_back({begin * kMs, end * kMs});
   }
@@ -76,11 +79,19 @@ class OneAxis {
   /// The input changes, and a latch tells it 20 ms later.
   void latch(std::int64_t time, bool active, double told) {
     seen_.input.push_back({time * kMs, active});
-    seen_.latched.push_back({(time + kOffset + 20) * kMs, active, told});
+    const std::size_t request = seen_.requests.size() - 1;
+    seen_.latched.push_back({(time + kOffset + 20) * kMs, request, active, {told}});
   }
+  void input(std::int64_t time, bool active) { seen_.input.push_back({time * kMs, active}); }
+  void timeOutput(std::int64_t max_on, std::int64_t min_on, std::int64_t min_off) {
+    seen_.outputs = {{"pump", true, max_on * kMs, min_on * kMs, min_off * kMs}};
+  }
+  void takePlay(double backlash) { seen_.axes[0].backlash = backlash; }
   std::size_t broken() const { return brokenPromises(seen_).size(); }
 
  private:
+  std::int64_t count() const { return seen_.pulses[0].empty() ? 0 : seen_.pulses[0].back().count; }
+
   Observation seen_;
 };
 
@@ -116,6 +127,129 @@ TEST(Oracle, FindsLatchedPositionsAtEdgesOfTheInput) {
     axis.latch(2004, true, static_cast<double>(1000 + beside) / kStepsPerMetre);
     EXPECT_EQ(axis.broken(), beside == 0 ? 0U : 1U);
   }
+}
+
+TEST(Oracle, WantsTheEdgesOfALatchInItsWindow) {
+  for (const double from : {0.04, 0.06}) {
+    OneAxis axis;
+    axis.rest(1500, 0.0);
+    Request latch = requestOf(Kind::kOther, 2000, 2005);
+    latch.window = WindowOrder{0, from, 0.07};
+    axis.ask(latch);
+    axis.move(1005, 3005);
+    axis.latch(2004, true, 1000 / kStepsPerMetre);
+    EXPECT_EQ(axis.broken(), from == 0.04 ? 0U : 1U);
+  }
+}
+
+TEST(Oracle, FindsContactsAtEdgesOfTheInput) {
+  struct Case {
+    std::int64_t told;  // [steps]
+    bool active;
+    std::int64_t play;  // [steps]
+    bool is_right;
+  };
+  for (const Case& each : std::vector<Case>{{1000, true, 0, true},
+                                            {1002, true, 0, false},
+                                            {1000, false, 0, false},
+                                            {990, true, 10, true},
+                                            {1000, true, 10, false}}) {
+    OneAxis axis;
+    axis.takePlay(static_cast<double>(each.play) / kStepsPerMetre);
+    // Up and down again: nothing of it is taken up, and the way up begins with it.
+    if (each.play > 0) axis.moveAndReturn(200, 20);
+    axis.rest(1500, 0.0);
+    Request probe = requestOf(Kind::kMotion, 2000, 3500);
+    probe.probe = ProbeOrder{0, each.active};
+    probe.answer.contact = static_cast<double>(each.told) / kStepsPerMetre;
+    axis.ask(probe);
+    axis.move(1005, 3005);
+    axis.input(2004, true);
+    EXPECT_EQ(axis.broken(), each.is_right ? 0U : 1U) << each.told << ' ' << each.play;
+  }
+}
+
+/// Pulses of 5 ms each 200 steps from step 100 to step 900, and a motion alone of 1000 steps to
+/// there, a step each millisecond from 1005 on.
+OneAxis passing(const std::vector<std::int64_t>& on, int direction = 0, std::int64_t length = 5) {
+  OneAxis axis;
+  CompareOrder order;
+  order.has_pulses = true;
+  order.direction = direction;
+  order.distance = 200.0 / kStepsPerMetre;
+  order.begin = 100.0 / kStepsPerMetre;
+  order.end = 900.0 / kStepsPerMetre;
+  order.pulse = 5e-3;
+  Request compare = requestOf(Kind::kOther, 1100, 1110);
+  compare.compare = order;
+  axis.ask(compare);
+  axis.rest(1500, 0.0);
+  axis.ask(requestOf(Kind::kMotion, 2000, 2005));
+  axis.move(1005, 2005);
+  for (const std::int64_t count : on) {
+    axis.switchOutput(1004 + count, true);
+    axis.switchOutput(1004 + count + length, false);
+  }
+  axis.rest(3500, 1000.0 / kStepsPerMetre, true);
+  return axis;
+}
+
+TEST(Oracle, WantsAPulseAtEachPassageOfAPlace) {
+  EXPECT_EQ(passing({100, 300, 500, 700, 900}).broken(), 0U);
+  EXPECT_EQ(passing({100, 300, 700, 900}).broken(), 1U);
+  EXPECT_EQ(passing({100, 303, 500, 700, 900}).broken(), 2U) << "there, and not at the place";
+  EXPECT_EQ(passing({100, 300, 400, 500, 700, 900}).broken(), 1U);
+}
+
+TEST(Oracle, WantsPulsesInTheirDirection) {
+  EXPECT_EQ(passing({}, -1).broken(), 0U);
+  EXPECT_EQ(passing({300}, -1).broken(), 1U);
+  EXPECT_EQ(passing({100, 300, 500, 700, 900}, 1).broken(), 0U);
+}
+
+TEST(Oracle, LetsNoPulseLastTooLong) {
+  EXPECT_EQ(passing({100, 300, 500, 700, 900}, 1, 6).broken(), 5U);
+  EXPECT_EQ(passing({100, 300, 500, 700, 900}, 1, 4).broken(), 0U) << "the safe state ends one";
+}
+
+/// A path alone with marks at steps 200 and 600, the first one 10 ms before its place.
+OneAxis marked(const std::vector<std::int64_t>& changes) {
+  OneAxis axis;
+  axis.rest(1500, 0.0);
+  Request path = requestOf(Kind::kMotion, 2000, 2005);
+  path.path_axes = {0};
+  path.marks = {{0, true, 0.01, {200.0 / kStepsPerMetre}},
+                {0, false, 0.0, {600.0 / kStepsPerMetre}}};
+  axis.ask(path);
+  axis.move(1005, 2005);
+  bool on = false;
+  for (const std::int64_t count : changes) axis.switchOutput(1004 + count, on = !on);
+  axis.rest(3500, 1000.0 / kStepsPerMetre, true);
+  return axis;
+}
+
+TEST(Oracle, WantsEachMarkOfAPathOnceAtItsPlace) {
+  EXPECT_EQ(marked({190, 600}).broken(), 0U);
+  EXPECT_EQ(marked({200, 600}).broken(), 1U) << "without its lead";
+  EXPECT_EQ(marked({190, 604}).broken(), 1U);
+  EXPECT_EQ(marked({190}).broken(), 1U);
+  EXPECT_EQ(marked({190, 600, 800}).broken(), 1U);
+}
+
+TEST(Oracle, WantsTheTimesOfAnOutput) {
+  const auto switched = [](const std::vector<std::int64_t>& times) {
+    OneAxis axis;
+    axis.timeOutput(500, 30, 40);
+    axis.ask(requestOf(Kind::kEmergencyStop, 5000, 5010));
+    bool on = false;
+    for (const std::int64_t time : times) axis.switchOutput(time, on = !on);
+    return axis.broken();
+  };
+  EXPECT_EQ(switched({1000, 1500, 1540, 1570}), 0U);
+  EXPECT_EQ(switched({1000, 1530}), 1U);
+  EXPECT_EQ(switched({1000, 1500, 1539, 1580}), 1U);
+  EXPECT_EQ(switched({1000, 1029}), 1U);
+  EXPECT_EQ(switched({3990, 4005}), 0U) << "by the emergency stop";
 }
 
 TEST(Oracle, LetsNoOutputBeOnFromAnEmergencyStopToTheNextRecover) {
@@ -249,7 +383,7 @@ TEST(Oracle, HoldsASuccessAgainstTheTarget) {
     OneAxis axis;
     Request line = requestOf(Kind::kMotion, 2000, 2600);
     line.waits = true;
-    line.arrivals = {{0, 0.05, told}};
+    line.answer.arrivals = {{0, 0.05, told}};
     axis.ask(line);
     EXPECT_EQ(axis.broken(), told == 0.05 ? 0U : 1U);
   }

@@ -18,15 +18,14 @@ std::size_t RequestLog::begin(Request request) {
   return requests_.size() - 1;
 }
 
-void RequestLog::end(std::size_t index, bool success, std::string message,
-                     std::vector<Arrival> arrivals) {
+void RequestLog::end(std::size_t index, bool success, std::string message, Answer answer) {
   const std::int64_t now = steadyNow();
   const std::lock_guard<std::mutex> lock(mutex_);
   Request& request = requests_.at(index);
   request.answered = now;
   request.success = success;
   request.message = std::move(message);
-  request.arrivals = std::move(arrivals);
+  request.answer = std::move(answer);
 }
 
 std::vector<Request> RequestLog::requests() const {

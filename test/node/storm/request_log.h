@@ -51,6 +51,44 @@ struct OutputOrder {
   bool on = false;
 };
 
+/// Pulses of an output at places of an axis, or something else that the position of an axis does.
+struct CompareOrder {
+  bool has_pulses = false;  ///< false: cams, or nothing any more
+  std::size_t axis = 0;
+  int direction = 0;      ///< 1, -1 or both (0)
+  double distance = 0.0;  ///< [m] from place to place
+  double begin = 0.0;     ///< [m] the first one
+  double end = 0.0;       ///< [m]
+  double pulse = 0.0;     ///< [s]
+};
+
+/// A place at which a path switches an output.
+struct MarkOrder {
+  std::size_t output = 0;
+  bool on = false;
+  double lead = 0.0;             ///< [s] how much earlier
+  std::vector<double> position;  ///< [m] of each axis of the request, from where it rests before it
+};
+
+/// What a probing looks for.
+struct ProbeOrder {
+  std::size_t axis = 0;
+  bool active = false;  ///< the input's level at the contact
+};
+
+/// Edges count only while an axis is there.
+struct WindowOrder {
+  std::size_t axis = 0;
+  double from = 0.0;  ///< [m]
+  double to = 0.0;    ///< [m]
+};
+
+/// What an answer tells in addition to success and message.
+struct Answer {
+  std::vector<Arrival> arrivals;
+  std::optional<double> contact;  ///< [m] of the axis of a probing
+};
+
 /// A request and its result. Times are in nanoseconds of CLOCK_MONOTONIC.
 struct Request {
   int client = 0;
@@ -65,9 +103,14 @@ struct Request {
   std::optional<std::int64_t> answered;
   bool success = false;
   std::string message;
-  std::vector<Arrival> arrivals;
+  Answer answer;
   std::vector<Reach> reaches;  ///< one for each of its axes. Empty: that isn't known
   std::optional<OutputOrder> output = {};
+  std::optional<CompareOrder> compare = {};
+  std::vector<std::size_t> path_axes = {};  ///< those of the positions of marks
+  std::vector<MarkOrder> marks = {};        ///< in the order of the path; empty: none are judged
+  std::optional<ProbeOrder> probe = {};
+  std::optional<WindowOrder> window = {};  ///< of a latch
 };
 
 std::int64_t steadyNow();
@@ -77,7 +120,7 @@ class RequestLog {
  public:
   /// @return the number to pass to end().
   std::size_t begin(Request request);
-  void end(std::size_t index, bool success, std::string message, std::vector<Arrival> arrivals);
+  void end(std::size_t index, bool success, std::string message, Answer answer);
 
   std::vector<Request> requests() const;
   std::size_t count() const;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <thread>
 
 #include "support/wait.h"
@@ -97,14 +98,19 @@ void StormClient::sendMotion() {
       },
       [&] {
         const auto axes = someAxes();
-        const bool switches = chance(0.5);
-        std::uint64_t path =
-            calls_.followPath(axes, between(-kFarthest, kFarthest) / 3.0, true, 0.0, switches);
+        using Marks = DriverCalls::Marks;
+        const bool switches = chance(0.6);
+        std::uint64_t path = calls_.followPath(
+            axes, between(-kFarthest, kFarthest) / 3.0, true, 0.0,
+            !switches ? Marks::kNone : (chance(0.5) ? Marks::kAtCorners : Marks::kOnTheWay));
         while (path != 0 && chance(0.7)) {
           const bool more = chance(0.7);
           pause(0.3);
           const double size = between(-kFarthest, kFarthest) / 3.0;
-          if (!calls_.appendPath(path, axes, size, more, switches)) path = 0;
+          if (!calls_.appendPath(path, axes, size, more,
+                                 switches ? Marks::kAtCorners : Marks::kNone)) {
+            path = 0;
+          }
           if (!more) path = 0;
         }
       },
@@ -134,13 +140,16 @@ void StormClient::sendSetting() {
     calls_.setLimits(axis, or_configured(0.01, 0.04), or_configured(0.02, 0.2),
                      or_configured(0.05, 3.0));
   } else if (what < 0.5) {
-    const double from = anyPosition();
-    calls_.compare(axis, from, from + between(0.001, 0.02));
+    setCompare(axis);
   } else if (what < 0.6) {
-    const std::size_t last = kOutputs.size() - 1;
-    calls_.setOutput(std::uniform_int_distribution<std::size_t>(0, last)(random_), chance(0.6));
+    setOutput();
   } else if (what < 0.73) {
-    topics_.latch(number_, chance(0.5));
+    std::optional<WindowOrder> window;
+    if (chance(0.4)) {
+      const double from = anyPosition();
+      window = WindowOrder{axis, from, from + between(0.0, 0.03)};
+    }
+    topics_.latch(number_, chance(0.5), window);
   } else if (what < 0.78) {
     calls_.setPosition(axis, anyPosition());
   } else if (what < 0.82) {
@@ -154,6 +163,41 @@ void StormClient::sendSetting() {
     }
   } else {
     pressSwitch();
+  }
+}
+
+void StormClient::setCompare(std::size_t axis) {
+  const double what = between(0.0, 1.0);
+  const double from = anyPosition();
+  if (what < 0.1) {
+    calls_.clearCompare();
+  } else if (what < 0.4) {
+    calls_.compareCam(axis, from, from + between(0.001, 0.02), chance(0.5) ? 0.005 : 0.0);
+  } else {
+    CompareOrder order;
+    order.axis = axis;
+    order.direction = std::uniform_int_distribution<int>(-1, 1)(random_);
+    order.distance = between(0.001, 0.004);
+    order.begin = 0.5 * from;
+    order.end = order.begin + between(0.0, 0.06);
+    order.pulse = between(0.0005, 0.003);
+    calls_.comparePulses(order);
+  }
+}
+
+void StormClient::setOutput() {
+  const std::size_t last = kOutputs.size() - 1;
+  const auto output = std::uniform_int_distribution<std::size_t>(0, last)(random_);
+  const double what = between(0.0, 1.0);
+  const bool on = chance(0.6);
+  double value = on ? 1.0 : 0.0;
+  if (on && output == kPwmOutputIndex) value = between(0.01, 1.0);
+  if (what < 0.5) {
+    calls_.setOutput(output, on);
+  } else if (what < 0.8) {
+    calls_.setOutputValue(output, value);
+  } else {
+    topics_.output(number_, output, value);
   }
 }
 

@@ -37,6 +37,8 @@ class StormClient {
   void sendAnything();
   void sendMotion();
   void sendSetting();
+  void setCompare(std::size_t axis);
+  void setOutput();
   void sendPower();
   void sendEnding();
   void jog();

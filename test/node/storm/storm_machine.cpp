@@ -10,7 +10,9 @@ namespace {
 constexpr double kStepsPerMm = 20.0;
 constexpr int kMicrosteps = 16;
 constexpr int kHalfSteps = 2;
-constexpr const char* kFlag = "z_flag";
+constexpr double kTurn = 40.0;  // [mm] of the motor with an index
+constexpr const char* kFlag = "flag";
+constexpr const char* kIndex = "z_index";
 constexpr const char* kBlock = "x_block";
 
 struct Dynamics {
@@ -79,11 +81,20 @@ void setUpSwitches(node_test::NodeUnderTest& node) {
   setUpEndstop(node, "x", "min", "x_endstop_min");
   setUpHoming(node, "x", -52.0);
   node.set("axes/x/homing/switch", "min");
+  node.set("axes/y/homing/kind", "direct");
+  node.set("axes/y/homing/offset_mm", 10.0);
   setUpInput(node, kFlag, "z", 20.0, 25.0);
-  setUpHoming(node, "z", 20.0);
-  node.set("axes/z/homing/kind", "flag");
+  setUpInput(node, kIndex, "z", 32.0, 32.5);
+  node.set(std::string("simulation/inputs/") + kIndex + "/every_mm", kTurn);
+  node.set("axes/z/steps_per_round", static_cast<int>(kTurn * kStepsPerMm));
+  setUpHoming(node, "z", 32.0);
+  node.set("axes/z/homing/kind", "index");
   node.set("axes/z/homing/towards", "max");
-  node.set("axes/z/homing/input", kFlag);
+  node.set("axes/z/homing/flag", kFlag);
+  node.set("axes/z/homing/input", kIndex);
+  // No step is ever lost while it is homed.
+  node.set("axes/z/homing/check_at_flag", "fault");
+  node.set("axes/z/homing/check_tolerance_mm", 0.2);
 }
 
 void setUpPhases(node_test::NodeUnderTest& node) {
@@ -95,6 +106,11 @@ void setUpPhases(node_test::NodeUnderTest& node) {
   node.set("axes/x/homing/towards", "min");
   node.set("axes/x/homing/input", kBlock);
   node.set("axes/x/homing/approaches", 2);
+  setUpInput(node, kFlag, "y", 20.0, 25.0);
+  setUpHoming(node, "y", 22.5);
+  node.set("axes/y/homing/kind", "flag_centre");
+  node.set("axes/y/homing/towards", "max");
+  node.set("axes/y/homing/input", kFlag);
   node.set("axes/z/driver", "uln2003");
   node.set("axes/z/microsteps", kHalfSteps);
   for (const char* end : {"min", "max"}) {
@@ -133,7 +149,19 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node, StormMachine
   node.set("motor_power/off_delay_ms", 50.0);
   node.set("motor_power/feedback/pin", "motor_power_feedback");
   node.set("motor_power/feedback/active_level", "high");
-  for (const std::string& output : kOutputs) node.set("outputs/" + output + "/pin", output);
+  for (const std::string& output : kOutputs) {
+    if (output == kPwmOutput) {
+      node.set("outputs/" + output + "/pwm/chip", 0);
+      node.set("outputs/" + output + "/pwm/channel", 0);
+      node.set("outputs/" + output + "/pwm/frequency_hz", 1000.0);
+    } else {
+      node.set("outputs/" + output + "/pin", output);
+    }
+  }
+  const std::string timed = std::string("outputs/") + kTimedOutput + "/";
+  node.set(timed + "max_on_s", kMaxOn);
+  node.set(timed + "min_on_ms", 1e3 * kMinOn);
+  node.set(timed + "min_off_ms", 1e3 * kMinOff);
   setUpInput(node, kInput, "x", 4.0, 6.0);
   node.set(std::string("simulation/inputs/") + kInput + "/every_mm", 10.0);
   const std::initializer_list<const char*> pins = {"step", "dir",   "ms1",  "ms2",
@@ -150,8 +178,6 @@ std::vector<AxisFacts> setUpMachine(node_test::NodeUnderTest& node, StormMachine
   node.set("axes/y/tmc/run_current_a", kHighestCurrent);
   node.set("axes/y/backlash_mm", 8.0);
   facts.back().backlash = 8e-3;
-  node.set("axes/y/homing/kind", "direct");
-  node.set("axes/y/homing/offset_mm", 10.0);
   for (const char* axis : {"x", "y"}) {
     node.set(std::string("axes/") + axis + "/pins/enable", "xy_enable");
   }

@@ -17,6 +17,7 @@
 #include <mutex>
 #include <optional>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -65,12 +66,18 @@ class LatestStates {
             topic, 100, [this](const AxisStates::ConstPtr& states) {
               const std::lock_guard<std::mutex> lock(mutex_);
               latest_ = *states;
+              faults_.insert(states->fault.begin(), states->fault.end());
               ++count_;
             })) {}
   ~LatestStates() { subscriber_.shutdown(); }
   LatestStates(const LatestStates&) = delete;
   LatestStates& operator=(const LatestStates&) = delete;
 
+  /// All that faults have said so far.
+  std::set<std::string> faults() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return faults_;
+  }
   AxisStates latest() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return latest_;
@@ -92,6 +99,7 @@ class LatestStates {
   mutable std::mutex mutex_;
   AxisStates latest_;
   int count_ = 0;
+  std::set<std::string> faults_;
   ros::Subscriber subscriber_;
 };
 
@@ -136,8 +144,10 @@ class Storm : public testing::Test {
   void endMotions();
   void stopAll();
   void repair();
-  void noteRest();
+  /// @param alone see RestPoint
+  void noteRest(bool alone);
   void noteLatched(const LatchedPositions& edge);
+  void declarePositions();
   /// One motion from rest to rest, of which the oracle knows the whole way; often a slow one.
   void moveAlone();
   void end();
@@ -237,7 +247,7 @@ void Storm::repair() {
   if (chance(0.5)) ender_->speedOverride(1.0);
 }
 
-void Storm::noteRest() {
+void Storm::noteRest(bool alone) {
   // A state that is under way may be from before the last motion began.
   const int known = states_->count();
   const auto rests = [&] {
@@ -256,29 +266,59 @@ void Storm::noteRest() {
     fail("axis_states doesn't come any more");
     return;
   }
-  seen_.rests.push_back({at_rest, states_->latest().position});
+  const AxisStates states = states_->latest();
+  RestPoint& rest = seen_.rests.emplace_back();
+  rest.time = at_rest;
+  rest.positions = states.position;
+  for (std::size_t axis = 0; axis < states.name.size(); ++axis) {
+    rest.valid.push_back(states.position_valid[axis] != 0 && states.fault[axis].empty());
+  }
+  rest.alone = alone;
   memory_.push_back(static_cast<double>(node_.process().kilobytes("VmRSS")) / 1024.0);
 }
 
 void Storm::noteLatched(const LatchedPositions& edge) {
   const std::int64_t now = steadyNow();
   const std::lock_guard<std::mutex> lock(latched_mutex_);
-  seen_.latched.push_back({now, edge.active != 0, edge.position.front()});
+  seen_.latched.push_back({now, std::stoul(edge.goal), edge.active != 0, edge.position});
+}
+
+// A position that can't be trusted switches no output.
+void Storm::declarePositions() {
+  const AxisStates states = states_->latest();
+  for (std::size_t axis = 0; axis < states.name.size(); ++axis) {
+    if (states.position_valid[axis] == 0) ender_->setPosition(axis, states.position[axis]);
+  }
 }
 
 void Storm::moveAlone() {
   const std::vector<std::size_t> axes{chance(0.5) ? std::size_t{0} : std::size_t{1}, 2};
   const double velocity = std::pow(10.0, between(-4.0, -1.7));
-  switch (std::uniform_int_distribution<int>(0, 3)(random_)) {
+  if (chance(0.7)) {
+    CompareOrder order;
+    order.axis = axes[chance(0.7) ? 0 : 1];
+    order.direction = std::uniform_int_distribution<int>(-1, 1)(random_);
+    order.distance = between(0.001, 0.004);
+    order.begin = between(-0.05, -0.04);
+    order.end = 0.1;
+    order.pulse = between(0.0005, 0.003);
+    ender_->comparePulses(order);
+  }
+  switch (std::uniform_int_distribution<int>(0, 5)(random_)) {
     case 0:
-      ender_->moveTo(axes[0], between(0.0, 0.06), false, true);
-      break;
     case 1:
+      ender_->moveTo(axes[0], between(-0.04, 0.08), false, true);
+      break;
+    case 2:
       ender_->moveLine(axes, {between(-0.005, 0.005), between(-0.005, 0.005)}, true, 0.0, true);
+      break;
+    case 3:
+      ender_->probe(0, between(-0.04, 0.08), false, chance(0.5), chance(0.5));
       break;
     default:
       // For two seconds or so.
-      ender_->followPath(axes, 0.4 * velocity, false, velocity);
+      ender_->setOutput(kPathOutputIndex, false);
+      ender_->followPath(axes, 0.4 * velocity, false, velocity, DriverCalls::Marks::kOnTheWay);
       break;
   }
 }
@@ -301,6 +341,14 @@ void Storm::judge() {
   for (const AxisFacts& axis : seen_.axes) seen_.pulses.push_back(pulsesOf(trace, axis.name));
   std::size_t switches = 0;
   for (const std::string& output : kOutputs) {
+    OutputFacts& facts = seen_.outputs.emplace_back();
+    facts.name = output;
+    if (output == kTimedOutput) {
+      facts.is_timed = true;
+      facts.max_on = std::llround(kMaxOn * 1e9);
+      facts.min_on = std::llround(kMinOn * 1e9);
+      facts.min_off = std::llround(kMinOff * 1e9);
+    }
     bool on = false;
     std::vector<Switch>& changes = seen_.switches.emplace_back();
     for (const auto& edge : trace.at("outputs/" + output).edges) {
@@ -325,6 +373,9 @@ void Storm::judge() {
       seen_.latched.size(), seen_.rests.size(), seen_.stalls.size(), seen_.clock.size(),
       *std::min_element(memory_.begin(), memory_.end()),
       *std::max_element(memory_.begin(), memory_.end()));
+  for (const std::string& fault : states_->faults()) {
+    if (fault.find("lost steps") != std::string::npos) fail("no step was lost: " + fault);
+  }
   const auto broken = brokenPromises(seen_);
   for (std::size_t i = 0; i < std::min(broken.size(), kMostReported); ++i) fail(broken[i]);
   if (broken.size() > kMostReported) {
@@ -360,11 +411,14 @@ TEST_F(Storm, KeepsThePromises) {
     repair();
     storm();
     calm();
-    if (isAlive() && !failed_) noteRest();
+    if (isAlive() && !failed_) noteRest(false);
     if (!isAlive() || failed_ || !chance(0.5)) continue;
     repair();
+    declarePositions();
+    if (isAlive() && !failed_) noteRest(false);
+    if (!isAlive() || failed_) continue;
     moveAlone();
-    if (isAlive() && !failed_) noteRest();
+    if (isAlive() && !failed_) noteRest(true);
   }
   if (!isAlive()) {
     fail("the node has ended with " + std::to_string(node_.process().waitForExit(kBound).value()) +
