@@ -1,4 +1,5 @@
 #include <gpiod.h>
+#include <poll.h>
 
 #include <array>
 #include <cerrno>
@@ -138,15 +139,27 @@ class Inputs1 : public Inputs {
 
   const std::vector<int>& edgeFds() const override { return edge_fds_; }
 
-  int takeEdges(std::size_t fd, EdgeEvent* edges, std::size_t /*capacity*/) noexcept override {
-    gpiod_line_event event{};
-    if (gpiod_line_event_read_fd(edge_fds_[fd], &event) < 0) return -errno;
-    edges[0] = {edge_lines_[fd], event.event_type == GPIOD_LINE_EVENT_RISING_EDGE,
-                std::int64_t{event.ts.tv_sec} * 1'000'000'000 + event.ts.tv_nsec};
-    return 1;
+  // All that are there, so that a level which is read afterwards isn't older than an edge which is
+  // taken later. A call of libgpiod 1.4 reads one.
+  int takeEdges(std::size_t fd, EdgeEvent* edges, std::size_t capacity) noexcept override {
+    std::size_t count = 0;
+    do {
+      gpiod_line_event event{};
+      if (gpiod_line_event_read_fd(edge_fds_[fd], &event) < 0) {
+        return count > 0 ? static_cast<int>(count) : -errno;
+      }
+      edges[count++] = {edge_lines_[fd], event.event_type == GPIOD_LINE_EVENT_RISING_EDGE,
+                        std::int64_t{event.ts.tv_sec} * 1'000'000'000 + event.ts.tv_nsec};
+    } while (count < capacity && hasMore(edge_fds_[fd]));
+    return static_cast<int>(count);
   }
 
  private:
+  static bool hasMore(int fd) noexcept {
+    pollfd polled{fd, POLLIN, 0};
+    return poll(&polled, 1, 0) > 0 && (polled.revents & POLLIN) != 0;
+  }
+
   struct Place {
     Bulk* bulk;
     int index;
