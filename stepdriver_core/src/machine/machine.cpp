@@ -683,6 +683,7 @@ CoordinatedResult combinedResult(const std::vector<axis::MoveResult>& members) {
     result.duration = std::max(result.duration, own.duration);
     result.marks_made = std::max(result.marks_made, own.marks_made);
     result.marks_not_made = std::max(result.marks_not_made, own.marks_not_made);
+    result.marks_known = result.marks_known && own.marks_known;
     // An axis's own reason says more than that it was ended together with another one.
     const int weight = own.end == axis::MoveEnd::kReached     ? 0
                        : own.end == axis::MoveEnd::kCompanion ? 1

@@ -113,7 +113,12 @@ std::optional<MoveResult> Axis::Impl::result(const Move& move) const {
   // Nobody waits until the chip answers.
   std::string why = shell.whyHung();
   if (why.empty()) return std::nullopt;
-  return MoveResult{MoveEnd::kFault, std::move(why), shell.state(id).position, 0.0};
+  MoveResult result;
+  result.end = MoveEnd::kFault;
+  result.message = std::move(why);
+  result.position = shell.state(id).position;
+  result.marks_known = false;
+  return result;
 }
 
 void Axis::Impl::requireAccepted(const Move& move) const {

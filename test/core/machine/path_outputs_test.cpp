@@ -15,6 +15,7 @@
 #include "support/constants.h"
 #include "support/path_bench.h"
 #include "support/refusal.h"
+#include "support/traced_place.h"
 
 // Outputs that a path switches where its segments begin.
 
@@ -633,6 +634,29 @@ TEST_F(PathOutputs, WithAShaperTheyComeWithTheAxis) {
   begin();
   finish(dashes({4000, 5000, 9000}));  // both at constant speed
   expectWithSteps({4000, 5000});
+}
+
+// The parts of a motion with a constant acceleration a are around their mean by m = T/4, and so far
+// is the axis off: by a m^2/2. No motion within the limits is farther off.
+TEST_F(PathOutputs, WithAShaperTheyAreOffByItsVarianceWhileTheAxisAccelerates) {
+  for (config::AxisConfig& axis : axes) {
+    axis.start_speed = 0.0;
+    axis.input_shaper = {{config::ShaperType::kZv, 20.0, 0.0}};
+  }
+  begin();
+  const std::vector<std::int64_t> counts{200, 240, 280, 1360, 1600};  // the last one slows down
+  finish(dashes(counts));
+  const test::TracedAxes traced(*bench->trace, axes);
+  constexpr double kMean = 0.25 / 20.0;                            // s
+  constexpr double kOff = 1.0 / 2.0 * kMean * kMean / kMicrostep;  // 1 m/s^2
+  const std::vector<std::int64_t> times = edges();
+  ASSERT_EQ(times.size(), 4U);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const test::KnownPlace at = traced.at(0, static_cast<double>(times[i]));
+    const double off = at.place - (static_cast<double>(counts[i]) - 0.5);
+    EXPECT_LT(at.error, 0.1) << i;
+    EXPECT_NEAR(off, i < 3 ? kOff : -kOff, at.error + 1e-3) << i;
+  }
 }
 
 TEST_F(PathOutputs, WithAJerkLimitTheyComeWithTheAxis) {

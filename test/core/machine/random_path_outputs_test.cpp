@@ -100,6 +100,9 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
         axis.backlash = static_cast<double>(play) / axis.steps_per_unit;
       }
     }
+    lags_.assign(axes_.size(), {});
+    const bool is_shaped = chance(0.25);
+    if (is_shaped) drawShapers();
     if (shares) {
       for (config::AxisConfig& axis : axes_) axis.start_speed = 0.0;
       std::vector<config::AxisConfig> pair(axes_.begin(), axes_.begin() + 2);
@@ -118,6 +121,28 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes_);
     for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
     bench = std::make_unique<Bench>(axes_, specs, false, 0.0, options);
+  }
+
+  // Mostly the same for all axes.
+  void drawShapers() {
+    const double frequency = between(15.0, 80.0);
+    const bool is_same = chance(0.7);
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      config::AxisConfig& axis = axes_[k];
+      const double f = is_same ? frequency : between(15.0, 80.0);
+      axis.start_speed = 0.0;
+      axis.backlash = 0.0;
+      axis.input_shaper = {{config::ShaperType::kZv, f, 0.0}};
+      // Half of it at once, half of it half a period later.
+      lags_[k].mean = 0.25 / f;
+      const double acceleration = std::max(axis.acceleration, axis.deceleration);
+      lags_[k].most = acceleration / 2.0 * lags_[k].mean * lags_[k].mean;
+    }
+    double longest = 0.0;
+    for (const Lag& lag : lags_) longest = std::max(longest, lag.mean);
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      lags_[k].most += axes_[k].max_speed * (longest - lags_[k].mean);
+    }
   }
 
   static Point plus(const Point& point, const Point& direction, double way) {
@@ -398,7 +423,7 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
       const double scale = axes_[k].steps_per_unit;
       const KnownPlace at = traced.at(k, static_cast<double>(time_ns));
       const double exact = is_line ? kOnLine : kOnCurve;
-      const double may = at.error + exact + 2.0 * mark.tolerance * scale;
+      const double may = at.error + exact + (2.0 * mark.tolerance + lags_[k].most) * scale;
       const double off = std::abs(at.place - place[k] * scale);
       if (off > may) {
         text += axes_[k].name + " is " + std::to_string(off) + " microsteps off and may be " +
@@ -411,7 +436,7 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
   // On a line at an even rate, the path is what the axis makes.
   bool isToTheNanosecond(std::size_t axis, const DrawnMark& mark) const {
     return course_[mark.segment].shape() == PathSegment::Shape::kLine && !has_jerk_ &&
-           axes_[axis].backlash == 0.0 && disturbances_.empty();
+           axes_[axis].backlash == 0.0 && lags_[axis].mean == 0.0 && disturbances_.empty();
   }
 
   void judgeMade(const TracedAxes& traced, std::size_t output, std::size_t made,
@@ -475,7 +500,7 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
     for (std::size_t k = 0; k < axes_.size(); ++k) {
       const double scale = axes_[k].steps_per_unit;
       const double off = std::abs(at[k].place / scale - point[k]);
-      most = std::max(most, off - (at[k].error + kOnCurve) / scale - rounded);
+      most = std::max(most, off - (at[k].error + kOnCurve) / scale - rounded - lags_[k].most);
     }
     return most;
   }
@@ -528,6 +553,12 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
   std::vector<config::AxisConfig> axes_;
   std::vector<config::OutputConfig> outputs_;
   bool has_jerk_ = false;
+  // What an input shaper does to an axis.
+  struct Lag {
+    double mean = 0.0;  // [s]
+    double most = 0.0;  // [m] by which the axis can be off at a mark
+  };
+  std::vector<Lag> lags_;
   std::vector<DrawnSegment> course_;
   struct Joint {
     bool is_smooth = false;

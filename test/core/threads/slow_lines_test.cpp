@@ -389,6 +389,8 @@ TEST_F(SlowLines, AnOutputOfAPathIsSafeAfterItsWriteHasHung) {
   EXPECT_EQ(result.end, MoveEnd::kFault);
   EXPECT_NE(result.message.find(kWhy), std::string::npos) << result.message;
   EXPECT_EQ(result.marks_made, 0U);
+  EXPECT_EQ(result.marks_not_made, 0U);
+  EXPECT_FALSE(result.marks_known);
   expectSafeAfterHang();
 }
 

@@ -149,9 +149,11 @@ struct MoveResult {
   double position = 0.0;  ///< [unit] where the axis stands
   double duration = 0.0;  ///< [s] the time that the motion took
   /// Places at which its path switched outputs, and those at which it didn't because it ended
-  /// before, see motion::PathSegment::outputs. Both are 0 if the pulse thread hangs.
+  /// before, see motion::PathSegment::outputs.
   std::uint64_t marks_made = 0;
   std::uint64_t marks_not_made = 0;
+  /// False if the pulse thread hangs: both numbers are 0 then, and nothing is known about them.
+  bool marks_known = true;
 };
 
 /// A motion that was accepted.

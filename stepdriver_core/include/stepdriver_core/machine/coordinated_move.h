@@ -37,6 +37,7 @@ struct CoordinatedResult {
   double duration = 0.0;          ///< [s] the time that it took
   std::uint64_t marks_made = 0;   ///< as those of its members
   std::uint64_t marks_not_made = 0;
+  bool marks_known = true;  ///< whether those of all its members are
 };
 
 /// How such a motion ended, from how each of its axes ended it: for a move that outlived its

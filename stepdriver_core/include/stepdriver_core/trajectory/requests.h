@@ -108,6 +108,12 @@ struct PathSegment {
   /// Outputs that are switched where it begins or on its way, each at most once at a place, and
   /// without a stop. The begin is the middle of a corner that is rounded. A segment that leads
   /// nowhere switches them where it is, for example at the end of a path.
+  ///
+  /// With an input shaper whose parts A_i come later by t_i, the mean of which is m, they are
+  /// switched m later than planned. While an axis accelerates by a [unit/s^2], it is then off the
+  /// place by up to a/2 times the sum of A_i (t_i - m)^2 [unit]; at constant speed it is there. If
+  /// the axes have different shapers, the largest m counts, and an axis at the speed v with a
+  /// smaller one is off by v times the difference as well.
   std::vector<OutputSwitch> outputs{};
 };
 

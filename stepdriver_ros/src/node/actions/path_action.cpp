@@ -46,6 +46,7 @@ void PathAction::completeResult(const machine::CoordinatedResult& ended,
                                 FollowPathResult& result) const {
   result.switched = static_cast<std::uint32_t>(ended.marks_made);
   result.not_switched = static_cast<std::uint32_t>(ended.marks_not_made);
+  if (!ended.marks_known) result.message += "; how often it switched outputs isn't known";
 }
 
 }  // namespace stepdriver::ros_node
