@@ -229,8 +229,8 @@ tidy_all() {
 # that gcc has precompiled.
 configure_tidy() {
   local options=("$strict" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
-  configure "$src/stepdriver_core" "$build/tidy/core" "$strict" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
-    configure "$src" "$build/tidy/catkin" "$strict" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
+  configure "$src/stepdriver_core" "$build/tidy/core" "${options[@]}" -DSTEPDRIVER_BENCH=ON "$(python_option)" &&
+    configure "$src" "$build/tidy/catkin" "${options[@]}" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
     cmake --build "$build/tidy/catkin" -j "$jobs" --target stepdriver_generate_messages_cpp &&
     cp "$src/.clang-tidy" "$build/tidy/" &&
     cp "$src/test/.clang-tidy" "$build/tidy/core/test/" &&
@@ -435,7 +435,7 @@ check_docs() {
 
 check_trace() { bash "$root/scripts/demo.sh" --installed; }
 
-# ---- sanitizers: builds by the presets asan and tsan
+# ---- sanitizers: builds by the presets fuzz, which has those of the preset asan, and tsan
 
 # configure_sanitized PRESET: with the tests of the core in the same build, which compiles it once.
 configure_sanitized() { cmake -S "$src" --preset "$1" -B "$build/catkin-$1" -DSTEPDRIVER_TESTS=ON; }
@@ -455,9 +455,9 @@ for key, value in next(p for p in presets if p["name"] == name)["environment"].i
   eval "$exports"
 }
 
-# The search is of whole machines; the targets of --fuzz have these sanitizers too.
+# The search is of whole machines. The targets of --fuzz have these sanitizers too, and share the build.
 build_core_asan() {
-  configure_sanitized asan && build_sanitized asan pulse_tests recorder_tests search_tests threads_tests
+  configure_sanitized fuzz && build_sanitized fuzz pulse_tests recorder_tests search_tests threads_tests
 }
 # Those with more than one thread: the others have nothing to find for ThreadSanitizer.
 build_core_tsan() {
@@ -466,19 +466,18 @@ build_core_tsan() {
 # After that of the core.
 build_node_tsan() { build_sanitized tsan stepdriver_node; }
 
-# sanitize_core PRESET: runs the tests of the programs that are built.
+# sanitize_core SANITIZER PRESET: runs the tests of the programs that are built by that preset.
 sanitize_core() {
-  local preset=$1
-  await "build_core_$preset"
-  use_test_preset "$preset"
+  await "build_core_$1"
+  use_test_preset "$1"
   # The number of schedules of each kind that the search samples.
-  STEPDRIVER_SCHEDULES=400 ctest --test-dir "$build/catkin-$preset/stepdriver_core" -j "$jobs" --timeout 300 \
+  STEPDRIVER_SCHEDULES=400 ctest --test-dir "$build/catkin-$2/stepdriver_core" -j "$jobs" --timeout 300 \
     --no-tests=error --output-on-failure -E "_NOT_BUILT\$|^library\$|^CheckWaveform\$|^RigSoak|$slow_tests"
 }
 # These take long with a sanitizer.
 slow_tests='ForEachPairOfRequests|HybridWait.SpinsForLess|KeepTheAngleWhatever'
-sanitize_core_asan() { sanitize_core asan; }
-sanitize_core_tsan() { sanitize_core tsan; }
+sanitize_core_asan() { sanitize_core asan fuzz; }
+sanitize_core_tsan() { sanitize_core tsan tsan; }
 
 # Runs a storm and a test of --ros. Only the node that they start has the
 # sanitizer. It writes its findings to files, because not every test reads all that its node prints.
@@ -550,7 +549,7 @@ rm -f "$build"/log/*.times
 install_packages core ccache "${wanted[@]}" "$(wants node && echo ros plots panel ros-tests browser)" \
   "$(wants ros && echo trace)" "$(wants core && echo python python-tests pictures ${thorough:+bench})" \
   "$(wants lint && echo python ros plots ros-tests bench)" \
-  "$(wants sanitize && echo ros ros-tests)" "$(wants bad-days && echo ros ros-tests)" \
+  "$(wants sanitize && echo ros ros-tests fuzz)" "$(wants bad-days && echo ros ros-tests)" \
   "$(wants fuzz && echo ros)"
 # If they can't be installed, its stages say so.
 ! wants arm64 || (install_packages cross-arm64 board-arm64) || true
