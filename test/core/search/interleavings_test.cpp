@@ -352,6 +352,21 @@ TEST(Homings, OfEachMachineFindTheirPlaces) {
   }
 }
 
+// The same of places that are all refused, as they are of the first machine: its tool has an
+// at_stop.
+TEST(Compares, OfEachOtherMachineSwitchTheTool) {
+  for (int variant = 1; variant < static_cast<int>(kVariants); ++variant) {
+    for (const int client : {0, 1}) {
+      Participants participants({variant,
+                                 {{actNamed("the position of y switches the tool"), client, 0},
+                                  {actNamed("move y by 7 mm"), 1 - client, 400}},
+                                 {}});
+      EXPECT_EQ(participants.run(), std::vector<std::string>()) << "variant " << variant;
+      EXPECT_GE(participants.compared(), client == 0 ? 1U : 7U) << "variant " << variant;
+    }
+  }
+}
+
 TEST(DrawnMachines, HaveNumbersThatTheReaderAccepts) {
   std::mt19937_64 random(33);
   std::size_t differ = 0;

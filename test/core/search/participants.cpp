@@ -39,10 +39,17 @@ constexpr pulse::Nanoseconds kLongestLead = 40 * kMillisecond;
 constexpr const char* kEmergencyStop = "emergency_stop";
 /// An output with a name.
 constexpr const char* kTool = "tool";
+constexpr const char* kComparesCam = "the position of y switches the tool";
+constexpr const char* kComparesPulses = "the position of y makes pulses of the tool";
 /// [m] A position of y can switch it, on in here: as far as a move takes the axis.
 constexpr config::PositionCompare::Cam kToolCam{-0.001, 0.001};
+/// Or it makes pulses there: at each of these places.
+constexpr double kPulseEvery = 0.001;  // m
+constexpr pulse::Nanoseconds kPulse = 6 * kMillisecond;
 /// That is y.
 constexpr std::size_t kCompared = 1;
+/// [m] No step is lost, but one may be late.
+constexpr double kFlagTolerance = 0.0005;
 /// An input with a name, which the carriage of x presses between two places. [mm]
 constexpr const char* kProbeInput = "probe";
 /// One that the carriage of z presses in passing, at this place. [mm]
@@ -186,8 +193,11 @@ std::vector<config::AxisConfig> configsOf(int variant) {
     homing.seek_speed = 0.02;
     homing.latch_speed = 0.01;
     homing.offset = kPressedFrom / 1e3;
+    homing.check_at_flag = config::FlagCheck::kFault;
+    homing.flag_tolerance = kFlagTolerance;
   }
   configs[0].homing = homing;
+  homing.check_at_flag = config::FlagCheck::kNone;
   homing.kind = config::HomingKind::kDirect;
   configs[1].homing = homing;
   configs[1].homing->order = 1;  // the motors of x may be its own too
@@ -456,6 +466,7 @@ Participants::Participants(const Schedule& schedule)
                                                    wiring_.emergency_stop, wiring_.shared);
   }
   engine_->switchOutputs(wiring_.switchedOutputs(optionsOf(schedule.variant)));
+  tool_level_ = optionsOf(schedule.variant).outputs.front().level(true);
   if (schedule.variant == kSharing) oracle_.share({0, 1});
   controller_ = std::make_unique<machine::Controller>(
       configs_, wiring_.motor_lines, std::move(names), wiring_.emergency_stop,
@@ -497,9 +508,13 @@ Participants::Participants(const Schedule& schedule)
 // ---- the shell ----
 
 void Participants::turnEnded(const machine::MachineSnapshot& /*before*/,
-                             const std::shared_ptr<const machine::MachineSnapshot>& /*now*/,
+                             const std::shared_ptr<const machine::MachineSnapshot>& now,
                              activity::Outputs& out) {
   for (auto& [call, reply] : out.answers) answer(call, std::move(reply));
+  for (const machine::AxisSnapshot& axis : now->axes) {
+    const bool is_lost = axis.state.fault.find("lost steps") != std::string::npos;
+    if (is_lost && !edges_were_lost_) oracle_.complain("no step was lost: " + axis.state.fault);
+  }
   if (out.clear_stops != 0) engine_reads_inputs_ = true;
   for (const pulse::Command& command : out.commands) {
     for (std::size_t i = 0; i < command.follow_count; ++i) {
@@ -578,6 +593,9 @@ void Participants::answer(std::uint64_t call, activity::Reply reply) {
     noteRefusals(call, asked, *refusals);
   }
   oracle_.answered(call, !reply.failure, clock_.now(), at_fault);
+  if (!reply.failure && (asked.name == kComparesPulses || asked.name == kComparesCam)) {
+    compares_pulses_ = asked.name == kComparesPulses;
+  }
   if (!reply.failure && asked.meaning.quiet == Meaning::Quiet::kSlowsDown) checkSlowing(asked);
   const auto* moves = std::get_if<std::vector<axis::Move>>(&reply.value);
   if (!reply.failure && asked.enables) checkEnabled(asked);
@@ -802,6 +820,7 @@ void Participants::serveEngine() {
   clock_.woken = false;
   engine_waits_since_ = pulse::kNever;
   engine_due_ = engine_->serve();
+  checkPulse();
   if (std::exchange(input_stops_, engine_->inputStops()) != input_stops_) {
     note("the emergency stop input is active");
     oracle_.emergencyStopped(clock_.now(), rampBegins());
@@ -1778,8 +1797,14 @@ void Participants::checkLatches() {
 void Participants::compareTool(int client) {
   config::PositionCompare compare;
   compare.axis = configs_[kCompared].name;
-  compare.cams = {kToolCam};
-  post(client, "the position of y switches the tool",
+  const bool pulses = client == 1;
+  if (pulses) {
+    compare.every = config::PositionCompare::Every{kPulseEvery, -8 * kPulseEvery, 8 * kPulseEvery};
+    compare.pulse_ns = kPulse;
+  } else {
+    compare.cams = {kToolCam};
+  }
+  post(client, pulses ? kComparesPulses : kComparesCam,
        machine::SetPositionCompare{kTool, std::move(compare)}, {});
 }
 
@@ -2163,13 +2188,37 @@ void Participants::checkRest() {
   }
 }
 
+// A pulse begins in the pass that makes the step to its place.
+void Participants::checkPulse() {
+  if (!compares_pulses_) return;
+  const bool is_on = rig_.outputLevel(kTool) == tool_level_;
+  if (std::exchange(tool_was_on_, is_on) == is_on || !is_on) return;
+  const pulse::OutputLineState tool = engine_->output(0);
+  if (tool.compare == 0 || tool.muted) return;
+  // Late steps follow the plan, and steps that are put ahead are counted when they are played.
+  if (isEngineLate(schedule_) || schedule_.ahead) return;
+  const pulse::ChannelState y = engine_->channel(static_cast<int>(kCompared));
+  const auto snapshot = controller_->snapshot();
+  const machine::AxisSnapshot& now = snapshot->axes[kCompared];
+  const double place =
+      now.origin + (static_cast<double>(y.count - y.slack) + y.between) / now.steps_per_unit;
+  const double away = std::remainder(place, kPulseEvery) * now.steps_per_unit;
+  // Motors that axes share step one after the other.
+  if (std::abs(away) <= (schedule_.variant == kSharing ? 2.0 : 1.01)) return;
+  oracle_.complain(fmt::format("a pulse begins {:.2f} steps away from its place", away));
+}
+
 // At rest in its cam an output is on, and out of it off, however the axis got there.
 void Participants::checkCompared() {
   const pulse::OutputLineState tool = engine_->output(0);
   const pulse::ChannelState y = engine_->channel(static_cast<int>(kCompared));
   if (tool.compare == 0 || tool.muted || tool.too_long || y.following != 0 || pins_failed_) return;
   const config::OutputConfig config = optionsOf(schedule_.variant).outputs[0];
-  if (clock_.now() < tool.written.switched + config.min_on_ns) return;
+  if (clock_.now() < tool.written.switched + std::max(config.min_on_ns, kPulse)) return;
+  if (compares_pulses_) {
+    if (rig_.outputLevel(kTool) == config.level(true)) oracle_.complain("a pulse doesn't end");
+    return;
+  }
   const auto snapshot = controller_->snapshot();
   const machine::AxisSnapshot& now = snapshot->axes[kCompared];
   const double place = static_cast<double>(y.count - y.slack) + y.between;

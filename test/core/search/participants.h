@@ -144,6 +144,8 @@ class Participants : private machine::ShellCore::Host {
   void hashTo(EdgeHash& hash) { trace_->hash = &hash; }
   /// From now on, writes down each step.
   const std::vector<activity::AcceptedHoming>& homings() const { return homings_; }
+  /// What the position of y has made the tool do.
+  std::uint64_t compared() const { return engine_->output(0).compared; }
   void keepLog() { log_ = true; }
   const std::vector<std::string>& log() const { return lines_of_log_; }
 
@@ -176,7 +178,8 @@ class Participants : private machine::ShellCore::Host {
   /// Latches where all axes are at each edge of the probe, until endLatches().
   void beginLatch(int client);
   void endLatches(int client);
-  /// The position of y switches the tool: a cam around where it begins.
+  /// The position of y switches the tool: by a cam around where it begins, or for the other client
+  /// by pulses.
   void compareTool(int client);
   void emergencyStop(int client);
   void shutDown(int client);
@@ -202,7 +205,7 @@ class Participants : private machine::ShellCore::Host {
   /// @}
   void failNextPin(int error) { next_pin_error_ = error; }
   void hangNextPin(pulse::Nanoseconds time) { next_pin_hang_ = time; }
-  void loseEdges() { loses_edges_ = true; }
+  void loseEdges() { loses_edges_ = edges_were_lost_ = true; }
   /// @}
 
  private:
@@ -367,6 +370,7 @@ class Participants : private machine::ShellCore::Host {
   sim::RigAxisReport reportOf(const std::string& rig_axis) const;
   void checkRest();
   void checkCompared();
+  void checkPulse();
   void checkPower();
   bool ramps() const;
   std::optional<pulse::Nanoseconds> rampBegins() const;
@@ -408,6 +412,10 @@ class Participants : private machine::ShellCore::Host {
   std::vector<int> watched_;
   pulse::Nanoseconds watch_due_ = pulse::kNever;
   bool loses_edges_ = false;
+  bool edges_were_lost_ = false;
+  bool compares_pulses_ = false;
+  bool tool_was_on_ = false;
+  bool tool_level_ = true;  // while it is on
   int next_pin_error_ = 0;
   bool pins_failed_ = false;  // or took long
   pulse::Nanoseconds next_pin_hang_ = 0;
