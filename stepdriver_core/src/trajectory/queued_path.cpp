@@ -24,10 +24,10 @@ namespace {
 
 // A plan from a speed may exceed its share of the limits by this part, which is rounding.
 constexpr double kNoExcessFromSpeed = 1e-9;
-// A backlash that is slower than this part of the maximum speed is at rest. With a jerk limit it
-// comes to rest gently, and must not have an acceleration.
-constexpr double kStill = 1e-3;
-constexpr double kStillGently = 1e-6;
+// A backlash that is slower than this part of the maximum speed is at rest. Within the first knots,
+// which may be microseconds apart, a higher speed would end with a high acceleration, and a hold
+// may use what the plan needs anywhere.
+constexpr double kStill = 1e-6;
 // [microsteps] A backlash that is this close to whole microsteps is at rest.
 constexpr double kNearMicrostep = 1e-3;
 // If the axes can't slow down before a corner, its rounding begins later. The part of the segment
@@ -214,11 +214,10 @@ std::optional<std::vector<PathStart>> QueuedPath::statesAt(const Start& start,
     state.motor = motion_->members()[k].curve->stateAt(at_ns);
     if (axis.backlash == 0) continue;
     const double slack = state.motor.position.value() - axis.countOf(joint.position[k]);
-    const double still = axis.limits.jerk > 0.0 ? kStillGently : kStill;
     const double taking_up = state.motor.velocity - joint.velocity[k] * axis.steps_per_unit;
     state.slack = static_cast<double>(restingCount(slack));
     const bool rests = std::abs(slack - state.slack) < kNearMicrostep &&
-                       std::abs(taking_up) <= still * axis.limits.max_speed;
+                       std::abs(taking_up) <= kStill * axis.limits.max_speed;
     if (!rests) return std::nullopt;
   }
   return states;

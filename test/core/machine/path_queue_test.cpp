@@ -550,6 +550,36 @@ TEST_F(PathQueue, TakesUpTheBacklashOnTheWay) {
   expectLimits();
 }
 
+// The last moment of taking up a backlash isn't a place from which the path continues: to end it
+// within the first microseconds takes a high acceleration, which each later hold would use.
+TEST_F(PathQueue, IsHeldWithinItsLimitsAfterASegmentWasAppendedWhileABacklashIsTakenUp) {
+  PathSegment up = lineTo({0.68835923516457091e-3, 1.7531101682292075e-3});
+  up.tolerance = 0.3e-3;
+  PathSegment arc = test::arcTo({0.69652329824513182e-3, 2.5190951565047682e-3},
+                                {-0.31437368871761132e-3, 2.1468335525702356e-3});
+  arc.tolerance = 0.1e-3;
+  PathSegment down = lineTo({0.60566351280819629e-3, 2.1676220955868827e-3});
+  down.shape = PathSegment::Shape::kBezier;
+  down.control1 = {0.62030201263759679e-3, 2.7260782757647243e-3};
+  down.control2 = {0.72405833233903137e-3, 2.2337036715164437e-3};
+  for (int held_after = 20; held_after < 150; held_after += 5) {
+    SCOPED_TRACE(held_after);
+    std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+    axes[1].backlash = 6 * kMicrostep;
+    build(axes);
+    PathRequest request{{"x", "y"}, {up, arc, down}, false, 0.0, 0.0, true};
+    const CoordinatedMove move = followPath(request);
+    advance(0.005);
+    machine().appendPath({move.id(), {lineTo({3.2427e-3, 0.8661e-3})}, false});
+    advance(1e-3 * held_after - 0.005);
+    machine().hold();
+    advance(0.3);
+    EXPECT_EQ(test::violationsOf(bench->report("y")), "");
+    machine().resume();
+    EXPECT_EQ(machine().wait(move).end, axis::MoveEnd::kReached);
+  }
+}
+
 TEST_F(PathQueue, BeginsContinuesAndEndsWithDoubledPoints) {
   PathRequest path{{"x", "y"}, {}, false, 0.0, test::kTolerance};
   for (const double x : {0.0, 0.010, 0.010, 0.0, 0.0}) path.segments.push_back(lineTo({x, 0.0}));

@@ -452,7 +452,7 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
       ++switched_;
       // A lead that is longer than the way until there, or among commands.
       if (lead > 0 &&
-          (!traced.hasMovedBy(time) || isDisturbed(time - kMillisecond - 1, time + lead)))
+          (!traced.hasMovedBy(time) || isDisturbed(time - 2 * kMillisecond, time + lead)))
         continue;
       const std::string far = farFrom(traced, mark, time + lead);
       ASSERT_EQ(far, "") << "mark " << i << " of " << outputs_[output].name << ", segment "
