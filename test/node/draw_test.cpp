@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <fstream>
 #include <iomanip>
 #include <map>
@@ -150,14 +151,14 @@ class DrawWithATool : public Draw {
     trace_ = node.traced();
   }
 
-  /// Where the axes were [mm] when the tool was switched on and off, by the rig's trace: "10 10 to
+  /// Where the axes were [mm] when an output was switched on and off, by the rig's trace: "10 10 to
   /// 30 10; ...".
-  std::string drawn() {
+  std::string drawn(const std::string& output = "tool") {
     node.rig();
     const auto waves = readVcd(trace_);
     std::string text;
     bool on = false;
-    for (const Waveform::Edge& edge : waves.at("outputs/tool").edges) {
+    for (const Waveform::Edge& edge : waves.at("outputs/" + output).edges) {
       if (edge.level == std::exchange(on, edge.level)) continue;
       if (on && !text.empty()) text += "; ";
       if (!on) text += " to ";
@@ -198,6 +199,62 @@ TEST_F(DrawWithATool, SwitchesALaserWithoutAStop) {
   const auto end = draw({"--laser", "tool"});
   EXPECT_EQ(end.code, 0) << end.output;
   EXPECT_EQ(drawn(), "10 10 to 50 10; 70 10 to 90 10");
+}
+
+class DrawInColours : public DrawWithATool {
+ protected:
+  DrawInColours() : svg(".svg") {
+    node.set("outputs/engraver/pin", "engraver");
+    // In mm of the axes, which begin at the lower left corner, y is 40 less that of the file.
+    std::ofstream(svg.path()) << R"(<svg xmlns="http://www.w3.org/2000/svg" width="60" height="40"
+  viewBox="0 0 60 40" fill="none" stroke-width="0.1">
+  <path d="M 10 30 h 20" stroke="red"/>
+  <path d="M 40 30 v -20" stroke="#0000ff"/>
+  <path d="M 30 10 h -10" stroke="#f00"/>
+</svg>)";
+  }
+
+  // One of the packages that read SVG files is optional: Ubuntu 20.04 lacks it.
+  void SetUp() override {
+    if (std::system("/usr/bin/python3 -c 'import svgelements' 2> /dev/null && "
+                    "command -v rsvg-convert > /dev/null") != 0) {
+      GTEST_SKIP() << "python3-svgelements or librsvg2-bin is missing";
+    }
+  }
+
+  ProgramEnd drawSvg(const std::vector<std::string>& tools) const {
+    std::vector<std::string> all = {svg.path(), "--node", node.name(), "-o", picture.path(),
+                                    "--scale",  "1",      "--corner",  "10", "10"};
+    all.insert(all.end(), tools.begin(), tools.end());
+    return runProgram("draw", all);
+  }
+
+  const TemporaryFile svg;
+};
+
+TEST_F(DrawInColours, ChooseTheLaserOfEachStroke) {
+  node.start();
+  const auto end = drawSvg({"--laser", "red=tool", "--laser", "blue=engraver"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_EQ(drawn("tool"), "10 10 to 30 10; 30 30 to 20 30");
+  EXPECT_EQ(drawn("engraver"), "40 10 to 40 30");
+}
+
+TEST_F(DrawInColours, ChooseThePenOfEachStroke) {
+  node.start();
+  const auto end =
+      drawSvg({"--pen", "blue=engraver", "--pen", "tool", "--down-s", "0", "--up-s", "0"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_EQ(drawn("tool"), "10 10 to 30 10; 30 30 to 20 30") << "of all other colours";
+  EXPECT_EQ(drawn("engraver"), "40 10 to 40 30");
+}
+
+TEST_F(DrawInColours, WithoutAnOutputAreRefusedBeforeAnythingMoves) {
+  node.start();
+  const auto end = drawSvg({"--laser", "red=tool"});
+  EXPECT_EQ(end.code, 1);
+  expectSays(end.output, "#0000ff");
+  EXPECT_EQ(node.pulses(), 0);
 }
 
 TEST_F(DrawWithATool, RefusesAToolThatThereIsNot) {
