@@ -20,6 +20,8 @@ class InputEdges {
   struct Edge {
     bool active = false;
     pulse::Nanoseconds time = 0;  ///< clock time
+    /// The kernel has reported no such edge: the time is that of the reading that shows it.
+    bool was_read = false;
   };
 
   InputEdges(int line, bool active_level, pulse::Nanoseconds debounce)
@@ -33,11 +35,15 @@ class InputEdges {
   bool active() const { return input_.active(); }
   int error() const { return input_.error(); }
   int line() const { return input_.line(); }
+  /// Since when the level differs from that of the last edge, clock time; empty: it doesn't.
+  std::optional<pulse::Nanoseconds> changingSince() const {
+    return differs_ ? differs_ : input_.bouncesSince();
+  }
   /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const;
 
  private:
-  void add(bool level, pulse::Nanoseconds time, std::vector<Edge>& edges);
+  void add(bool level, pulse::Nanoseconds time, bool was_read, std::vector<Edge>& edges);
 
   DebouncedInput input_;
   bool active_level_;

@@ -105,12 +105,13 @@ void FlagChecks::look(const activity::Context& context, Check& check,
   lookForMissing(context, check, findings);
 }
 
-// Next to a reversal it can't be said at which side of the flag an edge is.
+// Next to a reversal it can't be said at which side of the flag an edge is, and of an edge that the
+// kernel has lost, it can't be said where it was.
 void FlagChecks::judge(const activity::Context& context, const activity::InputEdges::Edge& edge,
                        Check& check, std::vector<Finding>& findings) {
   axis::AxisModel& axis = *check.axis;
   const int direction = axis.directionAtTime(context.motionTimeAt(edge.time));
-  if (direction == 0) {
+  if (direction == 0 || edge.was_read) {
     check.expected = {};
     check.seen.fill(edge.time);
     return;
@@ -136,6 +137,9 @@ void FlagChecks::lookForMissing(const activity::Context& context, Check& check,
   const double tolerance = axis.config.homing->flag_tolerance;
   const pulse::Nanoseconds time = context.now - check.delay;
   if (time < check.began) return;
+  // It has changed, and what it has changed to isn't known yet.
+  const auto changing = check.edges.changingSince();
+  if (changing && context.now - *changing <= check.delay) return;
   const double place = positionAt(context, axis, time);
   for (const int direction : {-1, 1}) {
     for (const bool active : {false, true}) {

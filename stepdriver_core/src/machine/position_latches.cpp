@@ -63,7 +63,10 @@ std::string PositionLatches::look(const activity::Context& context, Open& open) 
   const auto outcome = motion ? motion->lock() : nullptr;
   const bool moves = outcome != nullptr && !outcome->get();
   if (open.over) {
-    conclude(open, "the positions were latched");
+    conclude(open, open.result.edge->was_read
+                       ? "the positions were latched when the input was read: the kernel has "
+                         "reported no edge"
+                       : "the positions were latched");
     return moves ? "the contact that it probed for has come" : "";
   }
   if (moves && open.edges.error() != 0) {
@@ -93,6 +96,7 @@ void PositionLatches::latch(const activity::Context& context,
   latched.number = ++open.result.edges;
   latched.active = edge.active;
   latched.time = edge.time;
+  latched.was_read = edge.was_read;
   for (const axis::AxisModel* axis : subject.axes) {
     latched.axes.push_back(
         {axis->name(), positionAt(context, *axis, edge.time), axis->position.isValid()});

@@ -35,7 +35,11 @@ ProbeResult Probing::run() {
     return result_;
   }
   result_.succeeded = true;
-  end(ProbeEnd::kContact, "there was a contact at the input " + request_.input);
+  end(ProbeEnd::kContact,
+      fmt::format("there was a contact at the input {}{}", request_.input,
+                  was_read_ ? "; the kernel has reported no edge, so its place is where the axes "
+                              "were when the input was read"
+                            : ""));
   return result_;
 }
 
@@ -56,6 +60,7 @@ bool Probing::take(const ProbeStrokeResult& touched, const char* which) {
   result_.positions = touched.line.positions;
   result_.contact.clear();
   if (touched.latched.latched) {
+    was_read_ = touched.latched.edge->was_read;
     for (const LatchedAxis& axis : touched.latched.edge->axes) {
       result_.contact.push_back(axis.position);
     }

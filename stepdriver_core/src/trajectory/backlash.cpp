@@ -17,9 +17,11 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kRoundedPosition = 1e-9;  // [microsteps] a smaller difference is rounding
+constexpr double kSamePlace = 1e-6;        // [microsteps] the same, of the sum of many ways
 constexpr double kNoTravel = 0.5;          // [microsteps] shorter ways make no step
 constexpr double kNoRoom = 0.001;          // less than this part of a limit is no room
 constexpr double kLonger = 1.1;
+constexpr double kRestedFor = 1e-9;  // [s] a motion that begins later than this begins at rest
 
 // A time at which the joint reverses, and its direction afterwards.
 struct Turn {
@@ -111,6 +113,23 @@ std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const Mo
   return std::nullopt;
 }
 
+// The part of the backlash that is taken up after a motor's motion, if it was `slack` before.
+double slackAfter(const Profile& motor, double slack, std::int64_t backlash) {
+  DoubleDouble last = motor.startPosition();
+  const auto goTo = [&](DoubleDouble position) {
+    slack = std::clamp(slack + (position - last).value(), 0.0, static_cast<double>(backlash));
+    last = position;
+  };
+  for (std::size_t i = 0; i < motor.pieceCount(); ++i) {
+    const Piece piece = motor.piece(i);
+    const double end = piece.duration.value();
+    for (double t = piece.firstTurn(0.0); t < end; t = piece.firstTurn(t))
+      goTo(piece.positionAt(t));
+    goTo(piece.positionAt(piece.duration));
+  }
+  return slack;
+}
+
 // The motions that take up the backlash, one reversal after the other.
 class TakeUps {
  public:
@@ -131,6 +150,8 @@ class TakeUps {
   std::optional<Profile> at(const Turn& turn, const Turn* next) {
     const MotionState from = stateAt(turn);
     const std::int64_t to = wanted(turn);
+    was_cut_ = was_cut_ || (asked_ && !restsAt(*asked_, turn));
+    asked_ = to;
     if (from.velocity == 0.0 && (from.position - fromInteger(to)).value() == 0.0) return {};
     auto taken = takeUp(joint_, turn.time_s, from, to, limits_);
     if (!taken) {
@@ -144,7 +165,18 @@ class TakeUps {
     return part(last_, 0.0, std::min(last_.duration(), left));
   }
   std::optional<double> noRoom() const { return no_room_; }
-  const Profile& last() const { return last_; }
+
+  /// Whether a reversal came before the motion for the previous one had ended: then the joint may
+  /// not have followed, and settle() knows.
+  bool wasCut() const { return was_cut_; }
+  /// The motion after a motor's motion that came to rest a time [s] after its start: the joint,
+  /// which is beyond its end by less than the backlash, is brought there from the other side. Empty
+  /// if it is there. @param slack the part that is taken up in fact, see slackAfter()
+  std::optional<Profile> settle(double slack, double time_s) {
+    if (!asked_ || std::abs(slack - static_cast<double>(*asked_)) < kSamePlace) return {};
+    const Turn back{time_s, *asked_ > 0 ? -1.0 : 1.0};
+    return at(back, nullptr);
+  }
 
  private:
   std::int64_t backlash_;
@@ -152,6 +184,8 @@ class TakeUps {
   PeaksBetween joint_;
   Profile last_;
   std::optional<double> no_room_;
+  std::optional<std::int64_t> asked_;  // by the latest reversal
+  bool was_cut_ = false;
 };
 
 // The backlash rests before the start, too.
@@ -164,15 +198,19 @@ void append(std::vector<Piece>& pieces, DoubleDouble& time, const Profile& taken
   time = start + taken.duration();
 }
 
-Profile offsetOf(TakeUps& take_ups, const std::vector<Turn>& turns, std::size_t first,
-                 double slack) {
-  std::vector<Piece> pieces;
-  DoubleDouble time;
-  for (std::size_t i = first; i < turns.size() && !take_ups.noRoom(); ++i) {
-    const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
-    if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
-  }
-  return pieces.empty() ? Profile(0, slack) : Profile(0, std::move(pieces));
+// The joint's motion plus that of the backlash, which ends with the joint at its end.
+Profile motorOf(const Profile& joint, double slack, std::int64_t backlash, TakeUps& take_ups,
+                std::vector<Piece> pieces, DoubleDouble time) {
+  const auto both = [&] {
+    return sum(joint, pieces.empty() ? Profile(0, slack) : Profile(0, pieces));
+  };
+  Profile motor = both();
+  if (!take_ups.wasCut() || take_ups.noRoom()) return motor;
+  const double rest = std::max(joint.duration(), time).value() + kRestedFor;
+  const auto settled = take_ups.settle(slackAfter(motor, slack, backlash), rest);
+  if (!settled) return motor;
+  append(pieces, time, *settled);
+  return both();
 }
 
 }  // namespace
@@ -182,9 +220,16 @@ MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
   const PeakTree peaks(joint);
   TakeUps take_ups(slack, backlash, limits,
                    [&](DoubleDouble from, DoubleDouble to) { return peaks.between(from, to); });
-  const Profile offset = offsetOf(take_ups, turnsOf(joint), 0, slack);
+  const std::vector<Turn> turns = turnsOf(joint);
+  std::vector<Piece> pieces;
+  DoubleDouble time;
+  for (std::size_t i = 0; i < turns.size() && !take_ups.noRoom(); ++i) {
+    const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
+    if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
+  }
+  Profile motor = motorOf(joint, slack, backlash, take_ups, std::move(pieces), time);
   if (take_ups.noRoom()) return {joint, take_ups.noRoom()};
-  return {sum(joint, offset), {}};
+  return {std::move(motor), {}};
 }
 
 // ---- joining ----
@@ -225,8 +270,8 @@ MotorTail::MotorTail(const Profile& joint, std::int64_t backlash, const MotionLi
     const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
     if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
   }
+  motor_ = motorOf(joint, slack, backlash, take_ups, std::move(pieces), time);
   no_room_ = take_ups.noRoom();
-  motor_ = sum(joint, pieces.empty() ? Profile(0, slack) : Profile(0, std::move(pieces)));
   plan_ = std::move(plan);
 }
 
@@ -266,6 +311,7 @@ class MotorSections {
   }
   void add(Excerpt tail) { sections_.add(std::move(tail)); }
   DoubleDouble time() const { return time_; }
+  const Sections& sections() const { return sections_; }
   Sections release() { return std::move(sections_); }
 
  private:
@@ -350,6 +396,15 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
     return std::nullopt;
   } else {
     sections.rest(std::max(sections.time(), joint->duration()));
+  }
+  if (tail_from == nullptr && take_ups.wasCut()) {
+    const Profile unsettled(0, sections.sections());
+    const double rest = sections.time().value() + kRestedFor;
+    if (const auto settled = take_ups.settle(slackAfter(unsettled, slack, backlash_), rest)) {
+      sections.add(*settled);
+      joined.fresh.push_back({rest, rest + settled->duration().value()});
+    }
+    joined.no_room = take_ups.noRoom();
   }
   joined.profile = Profile(0, sections.release());
   return joined;

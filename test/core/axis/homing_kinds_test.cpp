@@ -9,6 +9,7 @@
 
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/error.h"
+#include "support/forgetful_rig.h"
 #include "support/homing_kinds_bench.h"
 
 // Homings to something else than a limit switch, on the rig: 80 steps/mm, endstops at -100 mm and
@@ -24,6 +25,7 @@ using test::Bench;
 using test::blockAxis;
 using test::flagAxis;
 using test::flagOf;
+using test::ForgetfulRig;
 using test::homingAxis;
 using test::HomingKindsTest;
 using test::indexAxis;
@@ -395,24 +397,6 @@ TEST_F(HomingToFlagTest, KnowsThePlaceOfTheJointWithABacklash) {
   const double trigger = 0.02 - 0.5 * kStep - 0.001;
   EXPECT_NEAR(x().state().position - config.homing->offset, joint - trigger, 1e-9);
 }
-
-/// A rig of which the kernel doesn't report some edges.
-class ForgetfulRig : public sim::Rig {
- public:
-  using sim::Rig::Rig;
-  /// @param loses whether the edge with this number, from 1, is lost.
-  void forget(std::function<bool(int)> loses) { loses_ = std::move(loses); }
-  void watchInput(int line, gpio::EdgeListener listener) override {
-    if (!listener) return sim::Rig::watchInput(line, nullptr);
-    sim::Rig::watchInput(line, [this, listener](bool level, std::int64_t time_ns) {
-      if (!loses_(++edges_)) listener(level, time_ns);
-    });
-  }
-
- private:
-  std::function<bool(int)> loses_;
-  int edges_ = 0;
-};
 
 struct ForgetfulHoming {
   HomingResult result;

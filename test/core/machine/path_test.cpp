@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -470,6 +471,17 @@ class SmoothPath : public Path {
     build(axes);
   }
 
+  /// [microsteps] where the joint x is, by the pulses.
+  double jointByPulses(int backlash) {
+    std::int64_t motor = 0;
+    std::int64_t slack = 0;
+    for (const test::MotionTrace::Step& step : test::MotionTrace(*bench).steps("x")) {
+      slack = std::clamp<std::int64_t>(slack + step.count - motor, 0, backlash);
+      motor = step.count;
+    }
+    return static_cast<double>(motor - slack);
+  }
+
   void expectOnTheCircle() {
     EXPECT_LE(farthest(pulsePlaces(), corners(circle())),
               kTolerance + kHalfMicrosteps + 0.1 * kMicrostep);
@@ -604,6 +616,30 @@ TEST_F(SmoothPath, TakesUpTheBacklashOnTheWay) {
   EXPECT_NEAR(result.positions[0], 0.0, 1e-12);
   EXPECT_EQ(bench->pulses("x"), 8);
   expectLimits(20.0, 20.0);
+}
+
+// While the backlash is still being taken up for the way back, the way forth begins: the joint
+// hasn't followed yet, and would stay where it is.
+TEST_F(SmoothPath, EndsAtItsEndEvenIfItsLastTurnsAreShorterThanTheBacklash) {
+  constexpr int kBacklash = 25;  // microsteps
+  for (const double jerk : {0.0, 20.0}) {
+    for (const int back : {1, 3, 10, 24, 40}) {
+      for (const double forth : {0.6, 2.4, 9.0, 30.0}) {
+        SCOPED_TRACE(fmt::format("{} back, {} forth, jerk {}", back, forth, jerk));
+        buildWith(jerk, jerk, kBacklash * kMicrostep);
+        const double turn = 100.0 - back;
+        const double end = turn + forth;
+        PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0};
+        for (const double place : {100.0, turn, end}) {
+          request.segments.push_back(lineTo({place * kMicrostep, 0.0}));
+        }
+        const CoordinatedResult result = finish(request);
+        EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+        EXPECT_NEAR(result.positions[0] / kMicrostep, end, 0.5 + 1e-6);
+        EXPECT_NEAR(jointByPulses(kBacklash), end, 0.5 + 1e-6);
+      }
+    }
+  }
 }
 
 TEST_F(SmoothPath, StopsWhereTheCurvatureJumpsOnlyWithoutATolerance) {

@@ -55,8 +55,11 @@ struct LatchedEdge {
   std::uint64_t number = 0;  ///< of the edges of this latch, from 1 on
   bool active = false;       ///< the input became active; false: inactive
   /// On the clock of the machine, by the kernel's time stamp; with a debounce time that of the
-  /// first contact. If the kernel has reported no edge, that of the reading.
+  /// first contact.
   pulse::Nanoseconds time = 0;
+  /// The kernel has reported no such edge: it has lost it, and the time is that of the reading that
+  /// shows the level. LatchResult::message and that of a probing say so.
+  bool was_read = false;
   std::vector<LatchedAxis> axes;
 };
 
