@@ -116,7 +116,7 @@ std::optional<Profile> takeUp(const PeaksBetween& joint, double time_s, const Mo
 // The part of the backlash that is taken up after a motor's motion, if it was `slack` before.
 double slackAfter(const Profile& motor, double slack, std::int64_t backlash) {
   DoubleDouble last = motor.startPosition();
-  const auto goTo = [&](DoubleDouble position) {
+  const auto go_to = [&](DoubleDouble position) {
     slack = std::clamp(slack + (position - last).value(), 0.0, static_cast<double>(backlash));
     last = position;
   };
@@ -124,8 +124,8 @@ double slackAfter(const Profile& motor, double slack, std::int64_t backlash) {
     const Piece piece = motor.piece(i);
     const double end = piece.duration.value();
     for (double t = piece.firstTurn(0.0); t < end; t = piece.firstTurn(t))
-      goTo(piece.positionAt(t));
-    goTo(piece.positionAt(piece.duration));
+      go_to(piece.positionAt(t));
+    go_to(piece.positionAt(piece.duration));
   }
   return slack;
 }
