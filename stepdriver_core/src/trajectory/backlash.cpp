@@ -17,7 +17,6 @@ namespace stepdriver::motion {
 namespace {
 
 constexpr double kRoundedPosition = 1e-9;  // [microsteps] a smaller difference is rounding
-constexpr double kSamePlace = 1e-6;        // [microsteps] the same, of the sum of many ways
 constexpr double kNoTravel = 0.5;          // [microsteps] shorter ways make no step
 constexpr double kNoRoom = 0.001;          // less than this part of a limit is no room
 constexpr double kLonger = 1.1;
@@ -173,7 +172,7 @@ class TakeUps {
   /// which is beyond its end by less than the backlash, is brought there from the other side. Empty
   /// if it is there. @param slack the part that is taken up in fact, see slackAfter()
   std::optional<Profile> settle(double slack, double time_s) {
-    if (!asked_ || std::abs(slack - static_cast<double>(*asked_)) < kSamePlace) return {};
+    if (!asked_ || std::abs(slack - static_cast<double>(*asked_)) < kNoTravel) return {};
     const Turn back{time_s, *asked_ > 0 ? -1.0 : 1.0};
     return at(back, nullptr);
   }
@@ -369,11 +368,20 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
   });
   MotorSections sections(joint, slack);
   JoinedMotor joined{Profile(0, 0.0), {{0.0, later}}, {}};
+  // Whether the joint is where the tail expects it, though a reversal came too soon before.
+  const auto follows = [&](const Turn& before, const Turn& turn) {
+    if (!take_ups.wasCut()) return true;
+    MotorSections until = sections;
+    until.rest(turn.time_s);
+    const double taken = slackAfter(Profile(0, until.release()), slack, backlash_);
+    return std::abs(taken - static_cast<double>(take_ups.wanted(before))) < kNoTravel;
+  };
   const Turn* tail_from = nullptr;
   for (std::size_t i = 0; i < turns.size(); ++i) {
     const std::size_t of_tail = i < known ? 0 : same_from + i - known;
     if (of_tail > 0 && plan_->from_rest[of_tail] &&
-        take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i])) {
+        take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i]) &&
+        follows(turns[i - 1], turns[i])) {
       tail_from = &turns[i];
       break;
     }
