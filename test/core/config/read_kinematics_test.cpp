@@ -159,10 +159,7 @@ TEST(ReadKinematics, RefusesAHomingThatWouldCostTheOtherAxisItsPosition) {
       << lines[0];
 }
 
-// The index of a motor of a CoreXY comes at a place of x that depends on where y is.
-TEST(ReadKinematics, RefusesAHomingToAnIndexOfAMotorThatTheOtherAxisTurnsToo) {
-  ConfigValue tree = coreXy();
-  put(tree, "axes/x/steps_per_round", 3200);
+void homeToFlag(ConfigValue& tree) {
   put(tree, "axes/x/homing",
       mapOf({{"kind", "flag"},
              {"towards", "max"},
@@ -170,6 +167,13 @@ TEST(ReadKinematics, RefusesAHomingToAnIndexOfAMotorThatTheOtherAxisTurnsToo) {
              {"seek_speed_mm_s", 10.0},
              {"latch_speed_mm_s", 1.0},
              {"max_travel_mm", 100.0}}));
+}
+
+// The index of a motor of a CoreXY comes at a place of x that depends on where y is.
+TEST(ReadKinematics, RefusesAHomingToAnIndexOfAMotorThatTheOtherAxisTurnsToo) {
+  ConfigValue tree = coreXy();
+  put(tree, "axes/x/steps_per_round", 3200);
+  homeToFlag(tree);
   Lines lines;
   read(tree, lines);
   EXPECT_EQ(lines, Lines{});
@@ -193,13 +197,7 @@ TEST(ReadKinematics, RefusesAHomingToAStallOfAMotorThatTheOtherAxisTurnsToo) {
                  {"run_current_a", 0.8},
                  {"stall_threshold", 60}}));
     }
-    put(tree, "axes/x/homing",
-        mapOf({{"kind", "flag"},
-               {"towards", "max"},
-               {"input", "home"},
-               {"seek_speed_mm_s", 10.0},
-               {"latch_speed_mm_s", 1.0},
-               {"max_travel_mm", 100.0}}));
+    homeToFlag(tree);
     Lines lines;
     read(tree, lines);
     EXPECT_EQ(lines, Lines{});
