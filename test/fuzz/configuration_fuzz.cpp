@@ -14,7 +14,7 @@
 #include "fuzz/fuzz_input.h"
 #include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/setup/simulation.h"
+#include "stepdriver_core/setup/hardware.h"
 #include "stepdriver_core/yaml.h"
 #include "support/unthreaded_machine.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "session.h"
-#include "stepdriver_core/machine/latch.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::python {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "session.h"
-#include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::python {
 

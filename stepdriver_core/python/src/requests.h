@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/config/config_value.h"
-#include "stepdriver_core/machine/coordinated_move.h"
 #include "stepdriver_core/machine/machine.h"
 
 /// What Python asks for, as the core takes it. They need the GIL.

@@ -2,11 +2,9 @@
 
 #include <pybind11/pybind11.h>
 
-#include "stepdriver_core/axis/axis_state.h"
-#include "stepdriver_core/machine/coordinated_move.h"
-#include "stepdriver_core/machine/latch.h"
+#include "stepdriver_core/axis/axis.h"
+#include "stepdriver_core/machine/io.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/machine/probe.h"
 #include "stepdriver_core/sim/rig.h"
 
 /// The core's values for Python: each as a dict whose keys are the fields of the Python class that

@@ -8,7 +8,7 @@
 
 #include "context.h"
 #include "goal.h"
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::activity {
 

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::activity {
 

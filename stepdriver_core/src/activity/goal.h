@@ -12,7 +12,7 @@
 #include "call.h"
 #include "motion_outputs.h"
 #include "point_to_point/motion_limits.h"
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "trajectory/shared_path.h"
 

@@ -9,7 +9,7 @@
 #include "activity.h"
 #include "motion_execution.h"
 #include "script.h"
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::activity {
 

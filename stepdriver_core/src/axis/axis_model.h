@@ -21,7 +21,7 @@
 #include "point_to_point/setpoint_stream.h"
 #include "position.h"
 #include "profile/profile.h"
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/config/axis_config.h"
 #include "trajectory/ended_path.h"
 #include "trajectory/path_axis.h"

@@ -1,4 +1,4 @@
-#include "stepdriver_core/driver/driver_state.h"
+#include "stepdriver_core/driver/driver_chip.h"
 
 namespace stepdriver::driver {
 

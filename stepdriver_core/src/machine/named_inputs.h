@@ -9,7 +9,7 @@
 #include "activity/debounced_input.h"
 #include "activity/input_edges.h"
 #include "stepdriver_core/config/io_config.h"
-#include "stepdriver_core/machine/io_states.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::machine {
 

@@ -10,7 +10,7 @@
 #include "channel/output_line.h"
 #include "output_setting.h"
 #include "stepdriver_core/config/io_config.h"
-#include "stepdriver_core/machine/io_states.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::machine {
 

@@ -9,7 +9,7 @@
 
 #include "activity/context.h"
 #include "activity/input_edges.h"
-#include "stepdriver_core/machine/latch.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::machine {
 

@@ -5,9 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/machine/coordinated_move.h"
-#include "stepdriver_core/machine/latch.h"
-#include "stepdriver_core/machine/probe.h"
+#include "stepdriver_core/machine/io.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::machine {
 

@@ -17,7 +17,7 @@
 #include "profile/input_shaper.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/driver/driver_state.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "tmc_chip.h"
 #include "translator.h"
 

@@ -9,7 +9,7 @@
 #include "driver/tmc_registers.h"
 #include "step_audit.h"
 #include "stepdriver_core/config/axis_config.h"
-#include "stepdriver_core/driver/driver_state.h"
+#include "stepdriver_core/driver/driver_chip.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::motor {

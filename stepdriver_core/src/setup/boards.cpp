@@ -11,7 +11,7 @@
 #include "port/klipper/tty_link.h"
 #include "sim/fake_board.h"
 #include "simulated_link.h"
-#include "stepdriver_core/setup/driver_check.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::setup {
 namespace {

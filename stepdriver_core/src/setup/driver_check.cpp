@@ -1,5 +1,3 @@
-#include "stepdriver_core/setup/driver_check.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,6 +15,7 @@
 #include "message_text.h"
 #include "motor/tmc_chip.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::setup {
 namespace {

@@ -16,7 +16,7 @@
 #include "setup/read_machine_config.h"
 #include "setup/read_simulation.h"
 #include "stepdriver_core/gpio/libgpiod_lines.h"
-#include "stepdriver_core/setup/simulation.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::setup {
 namespace {

@@ -7,7 +7,7 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/setup/simulation_config.h"
+#include "stepdriver_core/setup/machine_config.h"
 
 namespace stepdriver::setup {
 

@@ -1,5 +1,3 @@
-#include "stepdriver_core/setup/simulation.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include "setup/read_simulation.h"
 #include "sim/vcd_trace.h"
 #include "stepdriver_core/error.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::setup {
 namespace {

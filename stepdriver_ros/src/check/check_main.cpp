@@ -20,7 +20,7 @@
 #include "stepdriver_core/machine/step_rates.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/setup/driver_check.h"
+#include "stepdriver_core/setup/hardware.h"
 #include "system_report.h"
 
 namespace stepdriver::check {

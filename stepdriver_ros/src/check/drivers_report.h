@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/setup/driver_check.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::check {
 

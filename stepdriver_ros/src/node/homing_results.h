@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::ros_node {
 

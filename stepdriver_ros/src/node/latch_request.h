@@ -2,7 +2,7 @@
 
 #include <stepdriver/LatchGoal.h>
 
-#include "stepdriver_core/machine/latch.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::ros_node {
 

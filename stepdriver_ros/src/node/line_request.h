@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 

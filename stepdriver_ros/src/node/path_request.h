@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/machine.h"
 
 namespace stepdriver::ros_node {
 

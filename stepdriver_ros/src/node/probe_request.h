@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stepdriver_core/machine/probe.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::ros_node {
 

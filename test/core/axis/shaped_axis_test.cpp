@@ -16,7 +16,7 @@
 #include "sim/spring_mass.h"
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
 #include "support/constants.h"
 #include "support/corexy_bench.h"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stepdriver_core/setup/simulation_config.h"
+#include "stepdriver_core/setup/machine_config.h"
 #include "support/axis_config.h"
 
 namespace stepdriver::config {

@@ -1,11 +1,10 @@
-#include "stepdriver_core/setup/driver_check.h"
-
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "stepdriver_core/setup/hardware.h"
 #include "support/bench.h"
 #include "support/tmc_axis.h"
 

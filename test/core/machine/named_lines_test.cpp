@@ -13,7 +13,7 @@
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/recording.h"
-#include "stepdriver_core/setup/simulation.h"
+#include "stepdriver_core/setup/hardware.h"
 #include "support/bench.h"
 #include "support/constants.h"
 #include "support/making_backend.h"

@@ -17,7 +17,7 @@
 #include "geometry/path.h"
 #include "sim/motion_judge.h"
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/machine.h"
 #include "support/constants.h"
 #include "support/planned_path.h"
 #include "trajectory/path_reader.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/machine.h"
 #include "support/constants.h"
 #include "support/planned_path.h"
 #include "support/refusal.h"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "stepdriver_core/machine/coordinated_move.h"
+#include "stepdriver_core/machine/machine.h"
 #include "support/constants.h"
 #include "support/planned_path.h"
 

@@ -9,7 +9,7 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "stepdriver_core/pulse/clock.h"
-#include "stepdriver_core/setup/simulation.h"
+#include "stepdriver_core/setup/hardware.h"
 #include "stepdriver_core/sim/rig.h"
 #include "unthreaded_machine.h"
 

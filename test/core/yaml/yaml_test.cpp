@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "stepdriver_core/error.h"
-#include "stepdriver_core/setup/simulation.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::yaml {
 namespace {

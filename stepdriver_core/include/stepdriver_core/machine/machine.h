@@ -13,15 +13,48 @@
 #include "stepdriver_core/config/axis_config.h"
 #include "stepdriver_core/config/io_config.h"
 #include "stepdriver_core/gpio/lines.h"
-#include "stepdriver_core/machine/coordinated_move.h"
-#include "stepdriver_core/machine/io_states.h"
-#include "stepdriver_core/machine/latch.h"
-#include "stepdriver_core/machine/probe.h"
+#include "stepdriver_core/machine/io.h"
 #include "stepdriver_core/machine/recording.h"
 #include "stepdriver_core/pulse/capability.h"
 #include "stepdriver_core/pulse/clock.h"
+#include "stepdriver_core/trajectory/requests.h"
 
 namespace stepdriver::machine {
+
+/// An accepted motion of several axes.
+///
+/// @code{.cpp}
+/// const machine::CoordinatedMove line = machine.moveLine({{"x", "y"}, {0.05, 0.02}});  // [m]
+/// std::cout << "it takes " << line.duration << " s\n";
+/// std::cout << machine.wait(line).message << "\n";  // "all axes reached their targets"
+/// @endcode
+struct CoordinatedMove {
+  /// The part of one axis in it.
+  struct Member {
+    std::string axis;
+    axis::Move move;
+  };
+  std::vector<Member> members;  ///< in the order of the request
+  double duration = 0.0;        ///< [s] as planned
+  /// For Machine::appendPath(); never the same twice.
+  std::uint64_t id() const { return members.front().move.id; }
+};
+
+/// How and where a motion of several axes ended.
+struct CoordinatedResult {
+  /// How it ended: kReached, or what ended it first.
+  axis::MoveEnd end = axis::MoveEnd::kReached;
+  std::string message;            ///< a sentence that says how, and names the axis that ended it
+  std::vector<double> positions;  ///< [unit] where the members stand
+  double duration = 0.0;          ///< [s] the time that it took
+  std::uint64_t marks_made = 0;   ///< as those of its members
+  std::uint64_t marks_not_made = 0;
+  bool marks_known = true;  ///< whether those of all its members are
+};
+
+/// How such a motion ended, from how each of its axes ended it: for a move that outlived its
+/// machine, whose axis::Move::outcome are still there.
+CoordinatedResult combinedResult(const std::vector<axis::MoveResult>& members);
 
 /// An output whose level changes at a fixed rate as long as the pulse thread works, and stays as it
 /// is if that thread stands still: an external monostable or safety relay that watches it can take

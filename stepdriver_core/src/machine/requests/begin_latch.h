@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "request_context.h"
-#include "stepdriver_core/machine/latch.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::machine {
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "request_context.h"
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::machine {
 

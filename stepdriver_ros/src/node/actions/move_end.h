@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 
 namespace stepdriver::ros_node {
 

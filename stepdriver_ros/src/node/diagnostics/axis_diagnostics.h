@@ -2,7 +2,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include "stepdriver_core/axis/axis_state.h"
+#include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/config/axis_config.h"
 
 namespace stepdriver::ros_node {

@@ -2,7 +2,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include "stepdriver_core/machine/io_states.h"
+#include "stepdriver_core/machine/io.h"
 
 namespace stepdriver::ros_node {
 

@@ -8,7 +8,7 @@
 
 #include "node/calls/call_queues.h"
 #include "stepdriver_core/machine/machine.h"
-#include "stepdriver_core/setup/simulation.h"
+#include "stepdriver_core/setup/hardware.h"
 
 namespace stepdriver::ros_node {
 
