@@ -82,6 +82,8 @@ void Homing::onBegin(std::vector<Predecessor> /*predecessors*/) {
   axis_.position.beginHoming();
   axis_.is_being_homed = true;
   deadline_ = context().now + nanoseconds(config_.timeout);
+  // A hold came while it waited for its axis.
+  if (context().mode.held) held_since_ = context().now;
   waking_ = wakeSteps(context(), axis_);
   try {
     if (!waking_.empty()) waking_.front()->begin();

@@ -337,13 +337,17 @@ double RigAxis::steppedWay() const {
   return way;
 }
 
-// The steps of its motors are not at the same time: each may be half a microstep ahead or behind.
-// Only steps count: a rotor that snaps, a load that falls and a hand move the carriage as well.
+// The steps of its motors are not at the same time: each may be half a microstep ahead or behind,
+// and where late steps catch up with their plan, each motor does so at a speed of its own. Only
+// steps count: a rotor that snaps, a load that falls and a hand move the carriage as well.
 void RigAxis::noteMoved(std::int64_t time_ns) {
   double apart = 0.25 * spec_.full_step_travel / chip_.microsteps();
   for (const Drive& drive : drives_) {
-    apart += std::abs(drive.carriage_way) * drive.axis->spec_.full_step_travel /
-             drive.axis->chip_.microsteps();
+    const RigAxis& motor = *drive.axis;
+    const double late =
+        motor.spec_.limits ? motor.spec_.limits->late / motor.spec_.microsteps : 0.0;
+    apart += std::abs(drive.carriage_way) * motor.spec_.full_step_travel *
+             (1.0 / motor.chip_.microsteps() + late);
   }
   for (const Side side : {Side::kMin, Side::kMax}) {
     SwitchModel* const contact = switchAt(side);

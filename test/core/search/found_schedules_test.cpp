@@ -335,5 +335,17 @@ TEST(FoundSchedules, AChipThatLosesItsPowerAtAStepDoesNotChangeItsMicrosteps) {
   }
 }
 
+// The axis was about to be disabled by its idle timeout, so the homing had not begun when the hold
+// came, and then moved nevertheless.
+TEST(FoundSchedules, AHomingThatBeginsDuringAHoldMovesAfterTheResume) {
+  for (std::size_t after = 0; after < 16; ++after) {
+    for (const std::size_t later : {0, 1, 2, 4}) {
+      expectGood({2, {does(0, after, "home z"), does(1, later, "hold")}, {}});
+      expectGood(
+          {2, {does(0, after, "home z"), does(1, later, "hold"), does(1, 60, "resume")}, {}});
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver::search

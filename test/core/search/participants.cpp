@@ -74,6 +74,8 @@ constexpr pulse::Nanoseconds kLongestCall = 120 * kSecond;
 /// From the loss of the motor power to the last step, if an edge is lost and the engine is late.
 constexpr pulse::Nanoseconds kLossIsSeen = kInputPeriod + 2 * kLatestPass;
 constexpr pulse::Nanoseconds kQuietIsWatched = 250 * kMillisecond;
+/// The watcher is at most this late.
+constexpr pulse::Nanoseconds kLatestWatch = kSecond;
 constexpr std::size_t kMostSteps = 200'000;
 /// [microsteps] A motion may be outside of its hull by one, and half of one is between a target and
 /// the place nearest to it. Motors that axes share step one after the other.
@@ -872,10 +874,11 @@ bool Participants::engineIsDue() { return clock_.woken || clock_.now() >= engine
 
 bool Participants::boardIsDue() { return port_ && port_->playDue() <= clock_.now(); }
 
-// No time passes beyond it while the engine or the board are kept waiting.
+// No time passes beyond it while the engine, the board or the watcher are kept waiting.
 pulse::Nanoseconds Participants::latestTime() {
   pulse::Nanoseconds latest = pulse::kNever;
   if (engineIsDue()) latest = engine_waits_since_ + kLatestPass;
+  if (canGo(Who::kWatcher)) latest = std::min(latest, watcher_waits_since_ + kLatestWatch);
   if (!boardIsDue()) return latest;
   const pulse::Nanoseconds due = std::min(port_->playDue(), port_->oldestStep());
   return std::min(latest, std::max(due + latestPlayOf(schedule_), clock_.now()));
@@ -884,6 +887,7 @@ pulse::Nanoseconds Participants::latestTime() {
 pulse::Nanoseconds Participants::nextDue() {
   const pulse::Nanoseconds now = clock_.now();
   engine_waits_since_ = engineIsDue() ? std::min(engine_waits_since_, now) : pulse::kNever;
+  watcher_waits_since_ = canGo(Who::kWatcher) ? std::min(watcher_waits_since_, now) : pulse::kNever;
   pulse::Nanoseconds due = pulse::kNever;
   const auto look = [&](pulse::Nanoseconds time) {
     if (time > now) due = std::min(due, time);
@@ -2352,12 +2356,13 @@ void Participants::probe() {
 }
 
 // Somebody does what the refusals of an axis say whose ends share a switch.
-void Participants::leaveSharedSwitch(std::size_t axis) {
+bool Participants::leaveSharedSwitch(std::size_t axis) {
   const sim::RigAxisReport seen = rig_.report(configs_[axis].name);
   const bool is_pressed = seen.min_pressed || seen.max_pressed;
-  if (configs_[axis].switch_release == 0.0 || !is_pressed) return;
+  if (configs_[axis].switch_release == 0.0 || !is_pressed) return false;
   ask("disable", machine::Enable{{axis}, false}, {});
   rig_.placeCarriage(configs_[axis].name, 0.0, clock_.now());
+  return true;
 }
 
 void Participants::probeAxis(std::size_t axis) {
@@ -2373,6 +2378,8 @@ void Participants::probeAxis(std::size_t axis) {
   must("override 1", machine::SetSpeedOverride{1.0});
   if (configs_[axis].pins.sleep.wired()) must("wake", machine::Sleep{axis, false});
   must("enable", machine::Enable{{axis}, true});
+  // Its rotor may have turned to the next full step, and onto the switch.
+  if (leaveSharedSwitch(axis)) must("enable", machine::Enable{{axis}, true});
   const double before = rig_.report(name).carriage;
   // At its block it may have lost steps, and count itself anywhere.
   if (meetsBlock(configs_[axis])) must("set position", machine::SetPosition{axis, 0.0});

@@ -379,7 +379,7 @@ class Participants : private machine::ShellCore::Host {
   void checkInPosition();
   void probe();
   void probeAxis(std::size_t axis);
-  void leaveSharedSwitch(std::size_t axis);
+  bool leaveSharedSwitch(std::size_t axis);
   void judgeDone();
 
   const Schedule schedule_;
@@ -411,6 +411,7 @@ class Participants : private machine::ShellCore::Host {
   pulse::Nanoseconds engine_waits_since_ = pulse::kNever;
   std::vector<int> watched_;
   pulse::Nanoseconds watch_due_ = pulse::kNever;
+  pulse::Nanoseconds watcher_waits_since_ = pulse::kNever;
   bool loses_edges_ = false;
   bool edges_were_lost_ = false;
   bool compares_pulses_ = false;

@@ -64,7 +64,10 @@ class AheadPort final : public pulse::StepPort {
   void aim(std::size_t /*channel*/, int /*direction*/) override {}
   void put(const Step& step) override {
     const std::lock_guard<std::mutex> lock(mutex_);
-    tracks_[step.channel].open.push_back({step, step.time + habits_.late(step)});
+    Track& track = tracks_[step.channel];
+    // What was taken back before is played by now, and doesn't concern later steps.
+    track.taken_back = pulse::kNever;
+    track.open.push_back({step, step.time + habits_.late(step)});
     lanes_[step.channel].last = step.time;
     lanes_[step.channel].takes = step.time;
   }
