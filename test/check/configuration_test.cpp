@@ -28,6 +28,9 @@ class Configuration : public testing::Test {
   static constexpr const char* kAxis =
       "axes: {x: {driver: a4988, pins: {step: S, dir: D}, microsteps: 16, steps_per_mm: 80.0,\n"
       "  max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0}}\n";
+  static constexpr const char* kRounds =
+      "axes: {x: {driver: a4988, pins: {step: S, dir: D}, microsteps: 16, steps_per_mm: 80.0,\n"
+      "  full_steps_per_round: 200, max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0}}\n";
 
   std::string file(const std::string& text) {
     std::ofstream(path_) << text;
@@ -90,8 +93,12 @@ TEST_F(Configuration, RefusesWhatIsNoMapAsTheNodeDoes) {
 TEST_F(Configuration, IsShownWithTopSpeedsInStepsPerSecond) {
   const auto config = readConfiguration(file(kAxis), BackendChoice::kAsInTheFile);
   EXPECT_EQ(configurationText(config),
-            "  axis  driver  kind    microsteps  top speed  steps/s  endstops\n"
-            "  x     A4988   linear  16          100 mm/s   8000     none\n");
+            "  axis  driver  kind    microsteps  top speed  steps/s  rpm  endstops\n"
+            "  x     A4988   linear  16          100 mm/s   8000     -    none\n");
+  const auto known = readConfiguration(file(kRounds), BackendChoice::kAsInTheFile);
+  EXPECT_EQ(configurationText(known),
+            "  axis  driver  kind    microsteps  top speed  steps/s  rpm  endstops\n"
+            "  x     A4988   linear  16          100 mm/s   8000     150  none\n");
 }
 
 TEST_F(Configuration, HasTheFlightRecorder) {

@@ -120,7 +120,7 @@ class EngineReport : public testing::Test {
   EngineReport() {
     reading.max_lateness = 0.005;
     reading.figures.slips = reading.slips_before = 7;
-    reading.rates = {{"x", 8000.0, 20'000.0, 16'000.0, "calls"},
+    reading.rates = {{"x", 8000.0, 20'000.0, 16'000.0, "calls", 3200.0},
                      {"y", 1000.0, 20'000.0, 10'000.0, "calls"}};
     reading.rates_in_motion = {{"x", 4000.0, 20'000.0, 20'000.0, "calls"}};
   }
@@ -189,6 +189,10 @@ TEST_F(EngineReport, HasTheNumbers) {
   EXPECT_EQ(valueOf(status, "x: margin"), "5");
   EXPECT_EQ(valueOf(status, "x: margin at top speed"), "2");
   EXPECT_EQ(valueOf(status, "x: steps/s that this computer sustains"), "16000");
+  EXPECT_EQ(valueOf(status, "x: rpm"), "75");
+  EXPECT_EQ(valueOf(status, "x: rpm at top speed"), "150");
+  EXPECT_EQ(valueOf(status, "x: rpm that this computer sustains"), "300");
+  EXPECT_EQ(valueOf(status, "y: rpm at top speed"), "-");
   EXPECT_EQ(valueOf(status, "y: steps/s"), "0");
   EXPECT_EQ(valueOf(status, "y: margin"), "at rest");
   reading.rates.clear();

@@ -186,8 +186,8 @@ void requireAsMany(std::size_t axes, std::size_t others, const char* what) {
 
 std::string StepRate::text() const {
   const std::string of_alone = alone > held
-                                   ? fmt::format(" while all axes move ({} if only this one does)",
-                                                 sustainedText(alone, 0.0))
+                                   ? fmt::format(" while all axes move, and {} while only it does",
+                                                 sustainedText(alone, steps_per_round))
                                    : "";
   return fmt::format("{} needs {}{} this computer can sustain {}{}: {}", axis,
                      neededText(asked, steps_per_round), holds() ? ", and" : ", but",

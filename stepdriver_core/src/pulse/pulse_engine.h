@@ -109,8 +109,8 @@ class PulseEngine : private StepPort::Listener {
   /// @param time clock time of the edge.
   void noteEdge(int input, bool level, Nanoseconds time);
 
-  /// @name Emergency stops No motion is followed while more were requested than cleared, see
-  ///   StopCounts.
+  /// @name Emergency stops
+  /// No motion is followed while more were requested than cleared, see StopCounts.
   /// @{
 
   /// Lets the current pulses finish and sends no more, on any channel, until it is cleared.

@@ -40,12 +40,13 @@ ros_node::NodeConfig readConfiguration(const std::string& path, BackendChoice ch
 
 std::string configurationText(const ros_node::NodeConfig& config) {
   std::vector<std::vector<std::string>> rows = {
-      {"axis", "driver", "kind", "microsteps", "top speed", "steps/s", "endstops"}};
+      {"axis", "driver", "kind", "microsteps", "top speed", "steps/s", "rpm", "endstops"}};
   for (const config::AxisConfig& axis : config.axes) {
+    const double rate = axis.max_speed * axis.steps_per_unit;
     rows.push_back({axis.name, axis.driverTitles(),
                     axis.kind == config::Kind::kLinear ? "linear" : "rotary",
-                    std::to_string(axis.microsteps), speedText(axis),
-                    roundedText(axis.max_speed * axis.steps_per_unit), endstopsText(axis)});
+                    std::to_string(axis.microsteps), speedText(axis), roundedText(rate),
+                    rpmText(rate, axis.steps_per_round), endstopsText(axis)});
   }
   return table(rows);
 }

@@ -29,13 +29,6 @@ std::vector<std::string> rowOf(const std::string& what, const pulse::Spread& spr
 /// Rounded down: a user who enters this value must not be told that it is too high.
 std::string rateText(double rate) { return roundedText(std::floor(rate)); }
 
-/// The speed of the motor at a step rate, rounded down to a tenth; "-" if its steps per revolution
-/// are not known.
-std::string rpmText(double rate, double steps_per_round) {
-  if (steps_per_round <= 0.0) return "-";
-  return roundedText(std::floor(600.0 * rate / steps_per_round) / 10.0);
-}
-
 }  // namespace
 
 std::string measurementsText(const std::vector<config::AxisConfig>& axes,

@@ -15,6 +15,13 @@ inline std::string roundedText(double number) {
   return text;
 }
 
+/// The speed of a motor [rpm] at a step rate, rounded down to a tenth; "-" if its steps per
+/// revolution are not known.
+inline std::string rpmText(double rate, double steps_per_round) {
+  if (steps_per_round <= 0.0) return "-";
+  return roundedText(std::floor(600.0 * rate / steps_per_round) / 10.0);
+}
+
 /// A duration for messages [s]: to 0.01 s, and one digit of a shorter one.
 inline std::string durationText(double seconds) {
   char text[32];

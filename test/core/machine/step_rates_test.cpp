@@ -176,7 +176,7 @@ TEST(StepRates, ThatDoNotHoldNameAxisAskedRateHeldRateAndReason) {
       machine::stepRates(two, capabilityOf({77'500, 1'000'000, 2000, 500}, 2)).complaints();
   ASSERT_EQ(both.size(), 1U);
   EXPECT_NE(both[0].find("but this computer can sustain 48484 steps/s (909 rpm) while all axes "
-                         "move (50000 steps/s if only this one does): "),
+                         "move, and 50000 steps/s (937 rpm) while only it does: "),
             std::string::npos)
       << both[0];
 }

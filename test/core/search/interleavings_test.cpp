@@ -335,18 +335,26 @@ TEST_P(Interleavings, KeepThePromisesOnDrawnMachines) {
   });
 }
 
+/// The port that writes now, and one that takes steps ahead of time.
+const std::vector<std::optional<Ahead>> kPorts = {std::nullopt, Ahead{1'000'000, 0, 200'000}};
+
 // Otherwise the search would only play homings that fail.
 TEST(Homings, OfEachMachineFindTheirPlaces) {
-  for (int variant = 0; variant < static_cast<int>(kVariants); ++variant) {
-    for (const char* const act : {"home x", "home y", "home z"}) {
-      Participants participants({variant, {{actNamed(act), 0, 0}}, {}});
-      EXPECT_EQ(participants.run(), std::vector<std::string>()) << act << ", variant " << variant;
-      ASSERT_EQ(participants.homings().size(), 1U) << act << ", variant " << variant;
-      for (const auto& outcome : participants.homings().front().outcomes) {
-        const auto result = outcome->get();
-        ASSERT_TRUE(result) << act << ", variant " << variant;
-        EXPECT_EQ(result->end, axis::HomingEnd::kHomed)
-            << act << ", variant " << variant << ": " << result->message;
+  for (const auto& ahead : kPorts) {
+    for (int variant = 0; variant < static_cast<int>(kVariants); ++variant) {
+      for (const char* const act : {"home x", "home y", "home z"}) {
+        SCOPED_TRACE(std::string(act) + ", variant " + std::to_string(variant) +
+                     (ahead ? ", ahead" : ""));
+        Schedule schedule{variant, {{actNamed(act), 0, 0}}, {}};
+        schedule.ahead = ahead;
+        Participants participants(schedule);
+        EXPECT_EQ(participants.run(), std::vector<std::string>());
+        ASSERT_EQ(participants.homings().size(), 1U);
+        for (const auto& outcome : participants.homings().front().outcomes) {
+          const auto result = outcome->get();
+          ASSERT_TRUE(result);
+          EXPECT_EQ(result->end, axis::HomingEnd::kHomed) << result->message;
+        }
       }
     }
   }
@@ -355,14 +363,19 @@ TEST(Homings, OfEachMachineFindTheirPlaces) {
 // The same of places that are all refused, as they are of the first machine: its tool has an
 // at_stop.
 TEST(Compares, OfEachOtherMachineSwitchTheTool) {
-  for (int variant = 1; variant < static_cast<int>(kVariants); ++variant) {
-    for (const int client : {0, 1}) {
-      Participants participants({variant,
-                                 {{actNamed("the position of y switches the tool"), client, 0},
-                                  {actNamed("move y by 7 mm"), 1 - client, 400}},
-                                 {}});
-      EXPECT_EQ(participants.run(), std::vector<std::string>()) << "variant " << variant;
-      EXPECT_GE(participants.compared(), client == 0 ? 1U : 7U) << "variant " << variant;
+  for (const auto& ahead : kPorts) {
+    for (int variant = 1; variant < static_cast<int>(kVariants); ++variant) {
+      for (const int client : {0, 1}) {
+        SCOPED_TRACE("variant " + std::to_string(variant) + (ahead ? ", ahead" : ""));
+        Schedule schedule{variant,
+                          {{actNamed("the position of y switches the tool"), client, 0},
+                           {actNamed("move y by 7 mm"), 1 - client, 400}},
+                          {}};
+        schedule.ahead = ahead;
+        Participants participants(schedule);
+        EXPECT_EQ(participants.run(), std::vector<std::string>());
+        EXPECT_GE(participants.compared(), client == 0 ? 1U : 7U);
+      }
     }
   }
 }

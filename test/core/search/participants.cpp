@@ -521,8 +521,13 @@ void Participants::turnEnded(const machine::MachineSnapshot& /*before*/,
   for (const pulse::Command& command : out.commands) {
     for (std::size_t i = 0; i < command.follow_count; ++i) {
       const pulse::Follow& follow = command.follows[i];
-      ordered_.at(static_cast<std::size_t>(follow.channel))
-          .push_back({follow.serial, follow.group != 0});
+      // Where a late step would move the place that a homing measures.
+      const auto channel = static_cast<std::size_t>(follow.channel);
+      const bool is_homed = now->axes[channel].state.homing != axis::HomingPhase::kNone;
+      if (is_homed && follow.full_step != 0) {
+        oracle_.complain(configs_[channel].name + " may make late steps while it is homed");
+      }
+      ordered_.at(channel).push_back({follow.serial, follow.group != 0});
     }
   }
   if (hasRegisters(configs_)) noteTrouble();

@@ -62,11 +62,15 @@ const machine::StepRate* find(const std::vector<machine::StepRate>& rates,
 void addMargins(const EngineReading& reading, DiagnosticStatusWrapper& status) {
   for (const machine::StepRate& rate : reading.rates) {
     const machine::StepRate* const now = find(reading.rates_in_motion, rate.axis);
-    status.add(rate.axis + ": steps/s", roundedText(now != nullptr ? now->asked : 0.0));
+    const auto add_rate = [&](const std::string& of, double steps) {
+      status.add(rate.axis + ": steps/s" + of, roundedText(steps));
+      status.add(rate.axis + ": rpm" + of, rpmText(steps, rate.steps_per_round));
+    };
+    add_rate("", now != nullptr ? now->asked : 0.0);
     status.add(rate.axis + ": margin",
                now != nullptr ? roundedText(now->held / now->asked) : "at rest");
-    status.add(rate.axis + ": steps/s at top speed", roundedText(rate.asked));
-    status.add(rate.axis + ": steps/s that this computer sustains", roundedText(rate.held));
+    add_rate(" at top speed", rate.asked);
+    add_rate(" that this computer sustains", rate.held);
     status.add(rate.axis + ": margin at top speed", roundedText(rate.held / rate.asked));
   }
   if (reading.rates.empty()) status.add("margin", "not measured: the lines are simulated");
