@@ -76,6 +76,8 @@ struct Goal {
   bool runs() const {
     return kind == Kind::kJog || (kind == Kind::kSetpoint && !setpoint.of_position);
   }
+  /// It leads the joint to a place.
+  bool hasTarget() const { return !of_motor && !runs(); }
   bool isSetpointOfPosition() const { return kind == Kind::kSetpoint && setpoint.of_position; }
   /// It lasts only as long as its client sends messages: a hold ends it.
   bool isStreamed() const { return kind == Kind::kJog || kind == Kind::kSetpoint; }

@@ -339,6 +339,7 @@ void MotionExecution::order(Plans plans, const SharedCall& extension) {
     follow.stops = context_.stops_handled;
     follow.faults = axis.motor.state().faults();
     follow.slows = slowsDown();
+    follow.arrives = !slowsDown() && orders_[i].goal.hasTarget();
     follow.settles = mode_ == Mode::kRun;
     follow.still = orders_[i].goal.motors.still;
     follow.squares = orders_[i].goal.motors.square;

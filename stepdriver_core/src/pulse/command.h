@@ -37,6 +37,9 @@ struct Follow {
   std::uint64_t faults = 0;
   /// It brings the channel to rest: it is followed also in the ramp of an emergency stop.
   bool slows = false;
+  /// Its end is a target that was asked for: not a stop, and nothing that the machine does before,
+  /// as taking up a backlash.
+  bool arrives = false;
   /// At its end it waits for the in-position outputs, if the channel has any.
   bool settles = false;
   /// [microsteps] A full step: steps may be late by ChannelConfig::late_steps of it. 0: each step

@@ -68,6 +68,7 @@ void SumKin::halted() {
 void EngineChannel::follow(const Follow& order, Nanoseconds now) {
   group = order.group;
   slows = order.slows;
+  arrives = order.arrives;
   const bool from_rest = !motion->follows();
   if (from_rest) {
     state.still = order.still;

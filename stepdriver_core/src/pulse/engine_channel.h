@@ -117,6 +117,7 @@ struct EngineChannel {
 
   std::uint64_t group = 0;  // the last order's group; 0: no group
   bool slows = false;       // the last order brings it to rest
+  bool arrives = false;     // the last order leads to a target
   bool changed = false;     // it must be scheduled
   Nanoseconds at = 0;       // clock time of the next step
   Nanoseconds late = 0;     // how late the next step is so far

@@ -40,7 +40,7 @@ class EngineOutput {
   int channel() const { return channel_; }
   bool hasRoom(Nanoseconds start) const { return !compare_.follows() || compare_.hasRoom(start); }
   void followAxis(const Successors::Entry& entry, double joint) { compare_.follow(entry, joint); }
-  /// The axis has come to rest. @param reached it was where the motion led
+  /// The axis has come to rest. @param reached it was a target
   void axisEnded(Nanoseconds motion_now, double joint, bool reached);
   /// An order was handled.
   void taken(std::uint64_t serial);

@@ -797,7 +797,7 @@ void PulseEngine::endOne(Channel& channel, EndReason reason, bool abrupt, Nanose
   const bool done = reason == EndReason::kDone;
   for (const auto& output : outputs_) {
     if (output->channel() != static_cast<int>(channel.index)) continue;
-    output->axisEnded(now - state_.slipped, channel.joint(done), done && !channel.slows);
+    output->axisEnded(now - state_.slipped, channel.joint(done), done && channel.arrives);
   }
   channel.endMotion(reason, abrupt, now - state_.slipped);
   news_ = true;

@@ -37,6 +37,8 @@ void PrintTo(AxisOf kind, std::ostream* out) {  // NOLINT: GoogleTest's name
 }
 
 constexpr double kBacklash = 20 * kStep;
+constexpr double kAxisSpeed = 0.1;         // m/s, of all of them
+constexpr double kAxisAcceleration = 1.0;  // m/s^2
 /// The contacts of two inputs: the carriage presses them from the step to this count on.
 constexpr std::int64_t kContact = 1'600;
 
@@ -174,6 +176,66 @@ TEST_P(EventsOnAxes, ThePositionSwitchesAnOutputWithTheStepOfTheJoint) {
   machine().setPositionCompare("camera", compare);
   EXPECT_EQ(bench_->move(0.04).end, axis::MoveEnd::kReached);
   expectWithin(bench_->trace->times("outputs", "camera", true), timesOf({800, 1'600, 2'000}), 1);
+}
+
+// The judge's own times: how long the ramps take, and how long an axis is on its way to its first
+// step and from its last one.
+TEST_P(EventsOnAxes, TheEndOfAMotionSwitchesAnOutputAtItsBeginPlusItsDuration) {
+  config::PositionCompare end;
+  end.axis = "x";
+  end.at_end = true;
+  end.pulse_ns = test::kMillisecond;
+  const auto half_step = [](double part) { return std::sqrt(kStep / (part * kAxisAcceleration)); };
+  const auto trapezoid = [](double way) {
+    return way / kAxisSpeed + kAxisSpeed / kAxisAcceleration;
+  };
+  // As the MZV of 30 Hz and a damping of 0.1: its first part, its last one and its duration.
+  double first_part = 1.0;
+  double last_part = 1.0;
+  double delay = 0.0;
+  if (GetParam() == AxisOf::kShaper) {
+    const double ringing = std::sqrt(1.0 - 0.1 * 0.1);
+    const double decay = std::exp(-0.75 * test::kPi * 0.1 / ringing);
+    const double outer = 1.0 - std::sqrt(0.5);
+    const double sum = outer + (std::sqrt(2.0) - 1.0) * decay + outer * decay * decay;
+    first_part = outer / sum;
+    last_part = outer * decay * decay / sum;
+    delay = 0.75 / (30.0 * ringing);
+  }
+  enum class Motion { kMove, kLine, kPath };
+  for (const Motion motion : {Motion::kMove, Motion::kLine, Motion::kPath}) {
+    SCOPED_TRACE(static_cast<int>(motion));
+    build(GetParam());
+    machine().setPositionCompare("camera", end);
+    double way = 0.04;
+    if (motion == Motion::kMove) {
+      way += ahead();
+      EXPECT_EQ(bench_->move(0.04).end, axis::MoveEnd::kReached);
+    } else if (motion == Motion::kLine) {
+      // The motors of a CoreXY go as far as x only if y rests.
+      const double y = GetParam() == AxisOf::kCoreXy ? 0.0 : 0.02;
+      const auto line = machine().moveLine({{"x", "y"}, {0.04, y}, false, 0.0});
+      EXPECT_EQ(machine().wait(line).end, axis::MoveEnd::kReached);
+    } else {
+      test::PathRequest path{{"x", "y"}, {test::lineTo({0.01, 0.0})}, false, 0.0, 0.0};
+      path.segments.push_back(test::lineTo({0.04, 0.0}));
+      const auto result = machine().wait(machine().followPath(path));
+      EXPECT_EQ(result.end, axis::MoveEnd::kReached) << result.message;
+    }
+    machine().advance(0.01);
+    const std::vector<std::int64_t> fired = bench_->trace->times("outputs", "camera", true);
+    ASSERT_EQ(fired.size(), 1U) << "taking up the backlash is no motion of its own";
+    const auto from = [&](std::int64_t step, double seconds) {
+      return std::abs(fired[0] - step - std::llround(seconds * 1e9));
+    };
+    // A path leaves a fifth of the limits for taking up the backlash, which it does on its way.
+    const bool takes_up = motion == Motion::kPath && countsAhead() > 0;
+    EXPECT_LE(from(timeOf(3'200 + countsAhead()), half_step(takes_up ? 0.8 : last_part)), 1);
+    if (takes_up) continue;
+    // Before a line, the backlash has been taken up.
+    const std::int64_t first = timeOf(motion == Motion::kMove ? 1 : 1 + countsAhead());
+    EXPECT_LE(from(first, trapezoid(way) + delay - half_step(first_part)), 1);
+  }
 }
 
 // Two inputs have an edge at one instant.

@@ -379,6 +379,32 @@ TEST_F(PositionCompareTest, OnACoreXyItIsTheAxisAndNotAMotor) {
   EXPECT_EQ(shown(0).missed, 0U);
 }
 
+// Neither has a target of the axis, nor has what the machine does by itself.
+TEST_F(PositionCompareTest, AJogOrAnotherMicrostepModeHasNoEndThatSwitches) {
+  axes[0].align_on_microstep_change = true;
+  begin();
+  PositionCompare end;
+  end.axis = "x";
+  end.at_end = true;
+  end.pulse_ns = kMillisecond;
+  machine().setPositionCompare("camera", end);
+  axis::Axis& x = bench->axis("x");
+  x.jog(0.05);
+  advance(0.2);
+  x.jog(0.0);
+  while (x.state().moving) advance(1e-3);
+  advance(0.01);
+  EXPECT_TRUE(switchedOn().empty()) << "a jog";
+  move((std::round(x.state().position / kMicrostep / 16.0) * 16.0 + 3.0) * kMicrostep);
+  advance(0.01);
+  EXPECT_EQ(switchedOn().size(), 1U);
+  const std::size_t steps = arrivals().size();
+  x.setMicrosteps(1);
+  advance(0.01);
+  EXPECT_NE(arrivals().size(), steps) << "the motor goes to a full step";
+  EXPECT_EQ(switchedOn().size(), 1U);
+}
+
 TEST_F(PositionCompareTest, AtTheEndOfAMotionButNotOfAHoldOrAStop) {
   PositionCompare end;
   end.axis = "x";
