@@ -307,9 +307,13 @@ void MotionExecution::orderMarks(const Plans& plans,
   if (!marks_ || plans.path == nullptr) return;
   const auto along = course_.path->marks();
   if (!along) return;
-  std::int64_t delay = 0;
-  for (const Order& order : orders_) delay = std::max(delay, order.axis->motor.shapingDelay());
-  context_.motion_outputs.order(group_, plans.path, along, delay, context_.marksOf(follows));
+  std::vector<motion::ShapedAxis> axes;
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    axes.push_back({*plans.planned[i].motion, 1.0 / orders_[i].axis->stepsPerUnit()});
+  }
+  auto shaped = std::make_shared<const motion::ShapedAxes>(std::move(axes), plans.at);
+  if (shaped->longestDelayNs() == 0) shaped.reset();
+  context_.motion_outputs.order(group_, plans.path, along, shaped, context_.marksOf(follows));
 }
 
 // ---- orders to the engine ----

@@ -202,7 +202,7 @@ void MotionOutputs::orderCompare(Context& context, std::size_t number, Output& o
   taken.compares = true;
   output.taken_by = taken;
   output.wanted.reset();
-  output.kept.push_back({order->serial, nullptr, nullptr, nullptr, track, order});
+  output.kept.push_back({order->serial, nullptr, nullptr, nullptr, nullptr, track, order});
   pulse::Command& command = context.out->commands.emplace_back();
   command.kind = pulse::Command::Kind::kCompare;
   command.compare = order.get();
@@ -273,7 +273,7 @@ pulse::Nanoseconds MotionOutputs::mayBegin(const motion::PathMarks& marks) const
 
 void MotionOutputs::order(std::uint64_t group, const std::shared_ptr<const motion::Profile>& along,
                           const std::shared_ptr<const motion::PathMarks>& marks,
-                          pulse::Nanoseconds delay,
+                          const std::shared_ptr<const motion::ShapedAxes>& axes,
                           const std::shared_ptr<std::vector<pulse::FollowMarks>>& command) {
   for (const motion::OutputMarks& own : *marks) {
     Output& output = outputs_.at(own.output);
@@ -284,11 +284,11 @@ void MotionOutputs::order(std::uint64_t group, const std::shared_ptr<const motio
     follow.group = group;
     follow.along = along.get();
     follow.marks = &own;
-    follow.delay = delay;
+    follow.axes = axes.get();
     follow.begins = output.state.group != group && output.state.ended != group;
     follow.changes = output.state.changes;
     follow.written = output.line.written;
-    output.kept.push_back({follow.serial, along, marks, command, nullptr, nullptr});
+    output.kept.push_back({follow.serial, along, marks, axes, command, nullptr, nullptr});
   }
 }
 

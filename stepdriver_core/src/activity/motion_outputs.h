@@ -13,6 +13,7 @@
 #include "channel/output_line.h"
 #include "profile/marks.h"
 #include "profile/profile.h"
+#include "profile/shaped_axes.h"
 #include "pulse/command.h"
 #include "stepdriver_core/config/io_config.h"
 
@@ -106,8 +107,10 @@ class MotionOutputs {
   /// of their outputs are over.
   pulse::Nanoseconds mayBegin(const motion::PathMarks& marks) const;
   /// Orders its marks for a motion along it, in the command with those of its axes.
+  /// @param axes nullptr: they are where that motion is.
   void order(std::uint64_t group, const std::shared_ptr<const motion::Profile>& along,
-             const std::shared_ptr<const motion::PathMarks>& marks, pulse::Nanoseconds delay,
+             const std::shared_ptr<const motion::PathMarks>& marks,
+             const std::shared_ptr<const motion::ShapedAxes>& axes,
              const std::shared_ptr<std::vector<pulse::FollowMarks>>& command);
   /// Whether a mark is still to come in the motion as it is ordered.
   bool isDue(std::uint64_t group) const;
@@ -140,6 +143,7 @@ class MotionOutputs {
     std::uint64_t serial = 0;
     std::shared_ptr<const motion::Profile> along;
     std::shared_ptr<const motion::PathMarks> marks;
+    std::shared_ptr<const motion::ShapedAxes> axes;
     std::shared_ptr<const std::vector<pulse::FollowMarks>> command;
     std::shared_ptr<const pulse::CompareTrack> track;
     std::shared_ptr<const pulse::Compare> compare;

@@ -49,8 +49,6 @@ class Motor {
   /// A plan with its shaper, to be ordered next: it takes over from the motion that was ordered
   /// last, or begins at rest.
   motion::PlannedMotion shaped(motion::Profile plan) const;
-  /// [ns] How much later than its plan the motor is at constant speed, because of its shaper.
-  std::int64_t shapingDelay() const { return shaper_ ? shaper_->meanDelayNs() : 0; }
 
   /// [microsteps] The planned state of the motor at a motion time: what a plan begins from. With a
   /// shaper, the motor itself is still on its way there.

@@ -92,12 +92,4 @@ InputShaper InputShaper::with(const InputShaper& other) const {
   return InputShaper(std::move(both));
 }
 
-std::int64_t InputShaper::meanDelayNs() const {
-  double mean = 0.0;
-  for (const Impulse& impulse : impulses_) {
-    mean += impulse.part * static_cast<double>(impulse.delay_ns);
-  }
-  return std::llrint(mean);
-}
-
 }  // namespace stepdriver::motion

@@ -64,8 +64,6 @@ class InputShaper {
 
   /// The parts in the order of their delays, which all differ.
   const std::vector<Impulse>& impulses() const { return impulses_; }
-  /// How much later the shaped motion is at constant speed.
-  std::int64_t meanDelayNs() const;
   /// How much later the shaped motion ends.
   std::int64_t durationNs() const { return impulses_.back().delay_ns; }
 

@@ -8,6 +8,7 @@
 #include "channel/channel_state.h"
 #include "channel/output_line.h"
 #include "profile/marks.h"
+#include "profile/shaped_axes.h"
 #include "profile/shaped_profile.h"
 #include "stepdriver_core/pulse/clock.h"
 #include "timeline/compare_track.h"
@@ -68,7 +69,7 @@ struct FollowMarks {
   /// Live until the output reads a later order, or none, see OutputLineState::reads.
   const motion::Profile* along = nullptr;
   const motion::OutputMarks* marks = nullptr;
-  Nanoseconds delay = 0;  ///< by which the axes follow the motion along the path
+  const motion::ShapedAxes* axes = nullptr;  ///< see MarkFollower
   /// The path hasn't had the output yet: it begins with its first mark. Otherwise the order does
   /// nothing if the path's part has ended.
   bool begins = false;

@@ -23,7 +23,7 @@ void EngineOutput::follow(const FollowMarks& order) {
     state_.group = order.group;
     adopt(order.changes, order.written);
   }
-  marks_.follow({order.along, order.marks, order.delay, order.serial});
+  marks_.follow({order.along, order.marks, order.axes, order.serial});
 }
 
 // The state of the output when an order begins, unless that doesn't know the last change yet.

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "profile/marks.h"
+#include "profile/shaped_axes.h"
 #include "stepdriver_core/pulse/clock.h"
 
 namespace stepdriver::pulse {
@@ -19,8 +20,9 @@ class MarkFollower {
   struct Entry {
     const motion::Profile* along = nullptr;
     const motion::OutputMarks* marks = nullptr;
-    /// By how much the axes are behind the motion along the path: what an input shaper delays.
-    Nanoseconds delay = 0;
+    /// nullptr: the axes are where the motion along the path is. Otherwise it outlives the
+    /// following, too.
+    const motion::ShapedAxes* axes = nullptr;
     std::uint64_t serial = 0;
 
     Nanoseconds start() const { return along->startNs(); }
@@ -56,6 +58,8 @@ class MarkFollower {
   }
   void takeOver();
   void find();
+  Nanoseconds madeAt(Nanoseconds planned) const;
+  const motion::ShapedAxes& axesAt(Nanoseconds time) const;
 
   Entry current_;
   std::array<Entry, kCapacity> successors_{};

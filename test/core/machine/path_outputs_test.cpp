@@ -626,36 +626,71 @@ TEST_F(PathOutputs, AppendedSegmentsContinueThem) {
   }
 }
 
-TEST_F(PathOutputs, WithAShaperTheyComeWithTheAxis) {
+// From the first step to the last one: while the axis accelerates, at constant speed, and while it
+// comes to rest.
+TEST_F(PathOutputs, WithAShaperTheyComeWithTheStepsOfTheAxis) {
   for (config::AxisConfig& axis : axes) {
     axis.start_speed = 0.0;
     axis.input_shaper = {{config::ShaperType::kMzv, 42.0, 0.1}};
   }
   begin();
-  finish(dashes({4000, 5000, 9000}));  // both at constant speed
-  expectWithSteps({4000, 5000});
+  const std::vector<std::int64_t> counts{1, 2, 40, 200, 280, 4000, 5000, 8700, 8960, 8999, 9000};
+  std::vector<std::int64_t> with_end = counts;
+  with_end.push_back(9001);
+  finish(dashes(with_end));
+  expectWithSteps(counts);
 }
 
-// The parts of a motion with a constant acceleration a are around their mean by m = T/4, and so far
-// is the axis off: by a m^2/2. No motion within the limits is farther off.
-TEST_F(PathOutputs, WithAShaperTheyAreOffByItsVarianceWhileTheAxisAccelerates) {
+TEST_F(PathOutputs, WithAShaperHoldsAndOverridesTakeThemAlong) {
   for (config::AxisConfig& axis : axes) {
     axis.start_speed = 0.0;
-    axis.input_shaper = {{config::ShaperType::kZv, 20.0, 0.0}};
+    axis.input_shaper = {{config::ShaperType::kTwoHumpEi, 30.0, 0.1}};
   }
   begin();
-  const std::vector<std::int64_t> counts{200, 240, 280, 1360, 1600};  // the last one slows down
-  finish(dashes(counts));
+  std::vector<std::int64_t> counts;
+  for (std::int64_t i = 1; i <= 58; ++i) counts.push_back(50 * i);
+  const CoordinatedMove move = followPath(dashes(counts));
+  for (const double factor : {0.3, 1.0, 0.1, 0.7}) {
+    advance(0.07);
+    machine().setSpeedOverride(factor);
+    advance(0.013);
+    machine().hold();
+    advance(factor < 0.5 ? 0.01 : 2.0);  // before it rests, and at rest
+    machine().resume();
+  }
+  machine().setSpeedOverride(1.0);
+  const CoordinatedResult result = machine().wait(move);
+  EXPECT_EQ(result.end, MoveEnd::kReached) << result.message;
+  EXPECT_EQ(result.marks_made, 57U);
+  counts.pop_back();
+  expectWithSteps(counts);
+}
+
+// They leave the line, but not along it: one axis is as far behind the place as the other is
+// beyond.
+TEST_F(PathOutputs, WithDifferentShapersTheyComeWhenTheAxesAreAsFarAlongTheLine) {
+  for (config::AxisConfig& axis : axes) axis.start_speed = 0.0;
+  axes[0].input_shaper = {{config::ShaperType::kZv, 20.0, 0.0}};
+  begin();
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0};
+  const std::vector<std::int64_t> counts{200, 240, 280, 1360};
+  bool on = false;
+  for (const std::int64_t count : counts) {
+    request.segments.push_back(lineTo({stepTo(count), stepTo(count)}));
+    if (request.segments.size() > 1) request.segments.back().outputs = {{"pen", on = !on}};
+  }
+  request.segments.push_back(with(lineTo({0.02, 0.02}), {{"pen", !on}}));
+  finish(request);
   const test::TracedAxes traced(*bench->trace, axes);
-  constexpr double kMean = 0.25 / 20.0;                            // s
-  constexpr double kOff = 1.0 / 2.0 * kMean * kMean / kMicrostep;  // 1 m/s^2
   const std::vector<std::int64_t> times = edges();
-  ASSERT_EQ(times.size(), 4U);
+  ASSERT_EQ(times.size(), counts.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const test::KnownPlace at = traced.at(0, static_cast<double>(times[i]));
-    const double off = at.place - (static_cast<double>(counts[i]) - 0.5);
-    EXPECT_LT(at.error, 0.1) << i;
-    EXPECT_NEAR(off, i < 3 ? kOff : -kOff, at.error + 1e-3) << i;
+    const test::KnownPlace x = traced.at(0, static_cast<double>(times[i]));
+    const test::KnownPlace y = traced.at(1, static_cast<double>(times[i]));
+    const double middle = (x.place + y.place) / 2.0;
+    EXPECT_LT(x.error + y.error, 0.2) << i;
+    EXPECT_NEAR(middle, static_cast<double>(counts[i]) - 0.5, (x.error + y.error) / 2.0 + 1e-3);
+    EXPECT_GT(y.place, x.place + 10.0) << i;
   }
 }
 

@@ -109,11 +109,9 @@ struct PathSegment {
   /// without a stop. The begin is the middle of a corner that is rounded. A segment that leads
   /// nowhere switches them where it is, for example at the end of a path.
   ///
-  /// With an input shaper whose parts A_i come later by t_i, the mean of which is m, they are
-  /// switched m later than planned. While an axis accelerates by a [unit/s^2], it is then off the
-  /// place by up to a/2 times the sum of A_i (t_i - m)^2 [unit]; at constant speed it is there. If
-  /// the axes have different shapers, the largest m counts, and an axis at the speed v with a
-  /// smaller one is off by v times the difference as well.
+  /// With an input shaper, it is the shaped motion that counts. If the axes aren't on the path,
+  /// because the shaper makes a curve flatter or they have different ones, an output is switched
+  /// when they are as far as its place in the direction that the path has there.
   std::vector<OutputSwitch> outputs{};
 };
 
