@@ -53,12 +53,14 @@ struct Edge {
 class PositionCompareTest : public test::PathBench {
  protected:
   void SetUp() override {
-    options.outputs.resize(2);
+    options.outputs.resize(3);
     options.outputs[0].name = "camera";
     options.outputs[0].line = "camera.line";
     options.outputs[1].name = "valve";
     options.outputs[1].line = "valve.line";
     options.outputs[1].active_level = false;
+    options.outputs[2].name = "bell";
+    options.outputs[2].line = "bell.line";
     axes = {plotterAxis("x"), plotterAxis("y")};
     begin();
   }
@@ -524,7 +526,7 @@ TEST_F(PositionCompareTest, WhatCannotBeMadeIsRefusedWithTheNumber) {
                               const std::string& output = "camera") {
     EXPECT_REFUSED(machine().setPositionCompare(output, compare), why);
   };
-  refused(at({0.05}), "there is no output pump (outputs: camera, valve)", "pump");
+  refused(at({0.05}), "there is no output pump (outputs: camera, valve, bell)", "pump");
   refused(at({0.05}), "the output valve has at_stop: off", "valve");
   PositionCompare other = at({0.05});
   other.axis = "q";
@@ -649,6 +651,50 @@ TEST_F(PositionCompareTest, AnOutputThatFailsOnceMoreIsAFaultOnceMore) {
   }
 }
 
+// An axis that stops in a cam, or waits there.
+TEST_F(PositionCompareTest, AnOutputThatIsOnForTooLongIsSwitchedOffUntilItsNextPlace) {
+  options.outputs[1].max_on_ns = 500 * kMillisecond;
+  options.outputs[1].min_off_ns = 10 * kMillisecond;
+  begin();
+  machine().setPositionCompare("valve", cam(0.01, 0.012));
+  move(0.011);
+  EXPECT_TRUE(shown(1).on);
+  advance(2.0);
+  EXPECT_FALSE(shown(1).on);
+  ASSERT_EQ(edges(1).size(), 2U);
+  EXPECT_EQ(edges(1)[1].time_ns - edges(1)[0].time_ns, 500 * kMillisecond);
+  EXPECT_NE(shown(1).note.find("was switched off: it had been on for 0.5 s, the most that "
+                               "max_on_s allows"),
+            std::string::npos)
+      << shown(1).note;
+  EXPECT_EQ(state("x").fault, "");
+  // It isn't on again in the same cam, and its end has nothing left to do.
+  move(0.0115);
+  EXPECT_FALSE(shown(1).on);
+  move(0.02);
+  EXPECT_EQ(edges(1).size(), 2U);
+  // The next passage is like any other.
+  move(0.0);
+  EXPECT_EQ(edges(1).size(), 4U);
+  EXPECT_EQ(shown(1).note, "");
+  EXPECT_LT(edges(1)[3].time_ns - edges(1)[2].time_ns, 100 * kMillisecond);
+}
+
+// A hold in the middle of a cam is as long.
+TEST_F(PositionCompareTest, AHoldInACamEndsAtTheLongestTimeOfItsOutput) {
+  options.outputs[1].max_on_ns = 500 * kMillisecond;
+  begin();
+  machine().setPositionCompare("valve", cam(0.01, 0.08));
+  const axis::Move first = bench->axis("x").moveTo(0.09);
+  while (!shown(1).on) advance(1e-3);
+  machine().hold();
+  advance(2.0);
+  machine().resume();
+  EXPECT_EQ(bench->axis("x").wait(first).end, axis::MoveEnd::kReached);
+  ASSERT_EQ(edges(1).size(), 2U);
+  EXPECT_EQ(edges(1)[1].time_ns - edges(1)[0].time_ns, 500 * kMillisecond);
+}
+
 // ---- random motions ----
 
 class RandomPositionCompare : public PositionCompareTest, public testing::WithParamInterface<int> {
@@ -696,6 +742,13 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
       machine().setPositionCompare("valve", cams);
     }
     machine().setPositionCompare("camera", compare);
+    PositionCompare end;
+    end.axis = "x";
+    end.at_end = true;
+    end.pulse_ns = 10'000;
+    machine().setPositionCompare("bell", end);
+    moves_.clear();
+    is_judged_ = true;
     advance(0.001);
   }
 
@@ -724,16 +777,24 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
     return every(distance * kMicrostep, from * kMicrostep, to * kMicrostep);
   }
 
+  // What is judged: from a time at which the axis rests, to another one or an emergency stop.
+  struct Phase {
+    std::int64_t from = 0;
+    std::int64_t until = std::numeric_limits<std::int64_t>::max();
+    std::uint64_t compared = 0;  // before it, by the outputs
+    std::uint64_t missed = 0;
+    bool is_cut = false;  // by an emergency stop
+  };
   void disturb() {
     axis::Axis& x = bench->axis("x");
     const double what = unit();
     commands_.push_back(bench->clock.now());
     if (what < 0.45) {
-      x.moveTo(-0.04 + 0.09 * unit(), false, chance(0.5) ? 0.0 : 0.02 + 0.08 * unit());
+      moveTo(-0.04 + 0.09 * unit(), chance(0.5) ? 0.0 : 0.02 + 0.08 * unit());
     } else if (what < 0.55) {
-      x.moveTo(static_cast<double>(counts_[static_cast<std::size_t>(
-                   whole(0, static_cast<std::int64_t>(counts_.size()) - 1))]) *
-               kMicrostep);
+      moveTo(static_cast<double>(counts_[static_cast<std::size_t>(
+                 whole(0, static_cast<std::int64_t>(counts_.size()) - 1))]) *
+             kMicrostep);
     } else if (what < 0.65) {
       x.jog(-0.1 + 0.2 * unit());
     } else if (what < 0.75) {
@@ -745,9 +806,81 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
       machine().resume();
     } else {
       x.stop();
+      judgeStop();
     }
     ++motions_;
   }
+  void moveTo(double target, double velocity = 0.0) {
+    const axis::Move move = bench->axis("x").moveTo(target, false, velocity);
+    moves_.push_back({move, std::llround(target / kMicrostep)});
+    is_judged_ = false;
+  }
+
+  // What the last move says that it has left out: places and edges of the cam that are beyond the
+  // joint.
+  void judgeStop() {
+    if (std::exchange(is_judged_, true)) return;
+    const auto& [move, target] = moves_.back();
+    for (int i = 0; i < 1000 && !bench->axis("x").result(move); ++i) advance(1e-3);
+    const auto result = bench->axis("x").result(move);
+    ASSERT_TRUE(result);
+    if (result->end != axis::MoveEnd::kStopped) return;
+    const auto all = arrivals(play_);
+    const std::int64_t at = all.empty() ? 0 : all.back().count;
+    std::uint64_t left = 0;
+    const int way = target > at ? 1 : -1;
+    for (std::int64_t count = at; count != target;) {
+      const bool was_inside = isInCam(count);
+      count += way;
+      if (isInCam(count) != was_inside) ++left;
+      if (isPlace({0, count, way})) ++left;
+    }
+    EXPECT_EQ(result->marks_not_made, left) << result->message;
+    left_out_ += static_cast<int>(left);
+  }
+
+  // Each motion that has reached its target rings once, at its end.
+  void judgeBell(const Phase& phase) {
+    std::vector<std::int64_t> rung;
+    for (const Edge& edge : edgesIn(phase, 2)) {
+      if (edge.on) rung.push_back(edge.time_ns);
+    }
+    // A move to where the axis is, too, and one whose joint is then short of its target because of
+    // the backlash.
+    const auto reached = std::count_if(moves_.begin(), moves_.end(), [this](const auto& each) {
+      const auto result = bench->axis("x").result(each.first);
+      return result && (result->end == axis::MoveEnd::kReached ||
+                        result->message.find("ended before its target") != std::string::npos);
+    });
+    ASSERT_EQ(rung.size(), static_cast<std::size_t>(reached));
+    const auto steps = arrivals();
+    // [s] The motor's way of so many steps before its end.
+    const auto before_end = [this](double count) {
+      const config::AxisConfig& x = axes[0];
+      const double v = x.start_speed;
+      const double way = count * kMicrostep;
+      return (std::sqrt(v * v + 2.0 * x.deceleration * way) - v) / x.deceleration;
+    };
+    const bool is_plain = axes[0].jerk == 0.0 && axes[0].input_shaper.empty();
+    const double ramp = 1e9 * (before_end(1.5) - before_end(0.5));
+    for (const std::int64_t time : rung) {
+      const auto after = std::find_if(steps.begin(), steps.end(),
+                                      [&](const Arrival& step) { return step.time_ns > time; });
+      ASSERT_GE(after - steps.begin(), 2);
+      const std::int64_t last = (after - 1)->time_ns;
+      // A hold may have ended in the last half step.
+      if (isCommanded(last, time)) continue;
+      // As long as the last half step may take with a shaper.
+      ASSERT_LE(time - last, 60 * kMillisecond);
+      const double interval = static_cast<double>(last - (after - 2)->time_ns);
+      if (!is_plain || std::abs(interval - ramp) > 2.0) continue;
+      ASSERT_LE(std::abs(time - last - std::llround(1e9 * before_end(0.5))), 1) << time;
+      ++exact_ends_;
+    }
+    moves_.clear();
+    is_judged_ = true;
+  }
+
   void disturbOften() {
     for (int i = 0; i < 20; ++i) {
       test::refusal([this] { disturb(); });
@@ -755,14 +888,6 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
     }
   }
 
-  // What is judged: from a time at which the axis rests, to another one or an emergency stop.
-  struct Phase {
-    std::int64_t from = 0;
-    std::int64_t until = std::numeric_limits<std::int64_t>::max();
-    std::uint64_t compared = 0;  // before it, by the outputs
-    std::uint64_t missed = 0;
-    bool is_cut = false;  // by an emergency stop
-  };
   Phase phaseFromNow(int output) {
     Phase phase;
     phase.from = bench->clock.now();
@@ -911,9 +1036,13 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
     std::int64_t off = 0;
   } leads_;
   std::vector<std::int64_t> commands_;
+  std::vector<std::pair<axis::Move, std::int64_t>> moves_;  // with their targets [microsteps]
   int motions_ = 0;
   int marks_ = 0;
   int led_ = 0;
+  bool is_judged_ = true;  // what the last move has left out
+  int left_out_ = 0;       // places that stopped moves have told of
+  int exact_ends_ = 0;     // motions whose end was checked to the nanosecond
 };
 
 TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
@@ -924,7 +1053,7 @@ TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
     SCOPED_TRACE(number);
     random_.seed(static_cast<unsigned>(number));
     ASSERT_NO_FATAL_FAILURE(draw());
-    std::array<Phase, 2> phases{};  // of each output
+    std::array<Phase, 3> phases{};  // of each output
     disturbOften();
     if (chance(0.3)) {
       const std::int64_t asked = bench->clock.now();
@@ -936,14 +1065,16 @@ TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
       machine().emergencyStop();
       EXPECT_FALSE(shown(0).on);
       EXPECT_FALSE(shown(1).on);
+      EXPECT_FALSE(shown(2).on);
       advance(0.1);
       auto all = arrivals(play_);
       ASSERT_NO_FATAL_FAILURE(judgeCamera(phases[0], all));
       ASSERT_NO_FATAL_FAILURE(judgeValve(phases[1], all));
+      ASSERT_NO_FATAL_FAILURE(judgeBell(phases[2]));
       // From the place where it stands, they are switched again.
       machine().recover();
       machine().setSpeedOverride(1.0);
-      for (int output : {0, 1}) phases[static_cast<std::size_t>(output)] = phaseFromNow(output);
+      for (int output : {0, 1, 2}) phases[static_cast<std::size_t>(output)] = phaseFromNow(output);
       commands_.push_back(bench->clock.now());
       bench->axis("x").setPosition(static_cast<double>(countAt(all, asked + kSecond)) * kMicrostep);
       advance(0.001);
@@ -955,13 +1086,18 @@ TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
     const auto all = arrivals(play_);
     ASSERT_NO_FATAL_FAILURE(judgeCamera(phases[0], all));
     ASSERT_NO_FATAL_FAILURE(judgeValve(phases[1], all));
+    ASSERT_NO_FATAL_FAILURE(judgeBell(phases[2]));
     EXPECT_EQ(shown(1).on, isInCam(all.empty() ? 0 : all.back().count));
   }
   RecordProperty("motions", motions_);
   RecordProperty("marks", marks_);
   RecordProperty("led", led_);
-  EXPECT_GT(led_, 0);
-  EXPECT_GT(marks_, runs);
+  RecordProperty("left_out", left_out_);
+  RecordProperty("exact_ends", exact_ends_);
+  EXPECT_GT(led_, runs);
+  EXPECT_GT(marks_, 20 * runs);
+  EXPECT_GT(left_out_, runs);
+  EXPECT_GT(exact_ends_, runs / 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomPositionCompare, testing::Range(0, 10));
