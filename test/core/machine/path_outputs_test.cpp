@@ -162,6 +162,30 @@ TEST_F(PathOutputs, AreSwitchedAtTheNanosecondOfTheirPlacesWithoutAStop) {
   expectAtRest();
 }
 
+// Two strokes of a drawing that adjoin, each with a laser of its own, and a third one after a jump.
+TEST_F(PathOutputs, StrokesHaveNoGapInTheirStepsWhereTheLaserIsSwitched) {
+  const std::vector<std::int64_t> ends{800, 2000, 2800, 3600};
+  PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0};
+  request.segments = {lineTo({stepTo(ends[0]), 0.0}),
+                      with(lineTo({stepTo(ends[1]), 0.0}), {{"laser", true}}),
+                      with(lineTo({stepTo(ends[2]), 0.0}), {{"laser", false}, {"pen", true}}),
+                      with(lineTo({stepTo(ends[3]), 0.0}), {{"pen", false}}),
+                      with(lineTo({stepTo(4800), 0.0}), {{"pen", true}})};
+  finish(request);
+  const std::vector<std::int64_t> wanted = timesOfSteps(ends);
+  EXPECT_EQ(edges(1), (std::vector<std::int64_t>{wanted[0], wanted[1]}));
+  expectWithSteps({ends[1], ends[2], ends[3]});
+  // At 100 mm/s a microstep takes 125 us.
+  std::int64_t longest = 0;
+  const std::vector<Step> all = steps("x");
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    if (all[i].count < ends[0] || all[i].count > ends[3]) continue;
+    longest = std::max(longest, all[i].time_ns - all[i - 1].time_ns);
+  }
+  EXPECT_GT(longest, 0);
+  EXPECT_LE(longest, 125'001);
+}
+
 TEST_F(PathOutputs, AreSwitchedAtDistancesAlongASegment) {
   const std::vector<std::int64_t> counts{100, 200, 700, 707, 1500};
   PathRequest request{{"x", "y"}, {}, false, 0.0, 0.0005};
