@@ -104,8 +104,11 @@ TEST_F(EventsOnKernel, OutputsChangeWithTheStepsOfTheirPlaces) {
   EXPECT_TRUE(seen.violations.empty()) << reportOf(seen);
   ASSERT_EQ(seen.pulses.size(), 800U);
   std::vector<std::int64_t> of_pen;
-  for (const LineEdge& edge : trace.edges(trace.line("board-1:0"))) of_pen.push_back(edge.time_ns);
-  of_pen.resize(std::min(of_pen.size(), pens.size()));  // the end switches it off
+  const std::vector<LineEdge> edges = trace.edges(trace.line("board-1:0"));
+  ASSERT_EQ(edges.size(), pens.size() + 1) << "the end of the program leaves it off";
+  for (std::size_t i = 0; i < edges.size(); ++i) EXPECT_EQ(edges[i].level, i % 2 == 0) << i;
+  for (std::size_t i = 0; i < pens.size(); ++i) of_pen.push_back(edges[i].time_ns);
+  EXPECT_GT(edges.back().time_ns, seen.pulses.back().time_ns);
   std::vector<std::int64_t> shots;
   for (std::int64_t count = 200; count <= 600; count += 100) shots.push_back(count);
   const unsigned camera = trace.line("board-0:5");
