@@ -17,23 +17,12 @@ namespace {
 using activity::Activity;
 using activity::Goal;
 
-constexpr const char* kChipRemedy =
-    "let it cool down, check the motor's wiring and the current that is set, then call recover";
 constexpr const char* kPositionRemedy =
     "check what blocks the motor, and its encoder, then call recover, and home it or set its "
     "position";
 constexpr const char* kOutputRemedy = "then call recover, and switch it again";
 constexpr const char* kPowerRemedy =
     "check the relay, its supply and fuse, and the wiring of the feedback, then call recover";
-// A fault of a chip with a serial port is known within this time, and that of the wire: a silent
-// chip takes a tenth of a second for its three tries, and up to four share a port.
-constexpr pulse::Nanoseconds kPollPeriod = 250'000'000;
-constexpr pulse::Nanoseconds kAuditPeriod = 1'000'000'000;
-// From a sample of the load in motion to the next one: 20 a second, or less on a slow wire, of
-// which a chip's samples take at most a quarter.
-constexpr pulse::Nanoseconds kSamplePeriod = 50'000'000;
-constexpr pulse::Nanoseconds kPauseAfterSample = 3;  // times as long as the sample took
-
 constexpr const char* kLostStepsRemedy =
     "check what the motor moves, its current and its acceleration, call recover, and home it";
 
@@ -61,6 +50,11 @@ Controller::Controller(const std::vector<config::AxisConfig>& axes,
     : context_(names.inputs.size(), horizon),
       activities_(context_),
       requests_(context_, activities_, emergency_stop, std::move(named)),
+      chip_watch_(
+          context_, [this](const axis::AxisModel& axis) { return isBeingHomed(axis); },
+          [this](axis::AxisModel& axis, const std::string& fault, const std::string& remedy) {
+            failAxis(axis, fault, remedy);
+          }),
       io_(std::make_shared<const IoStates>(requests_.named.states())),
       emergency_disable_(emergency_disable) {
   context_.out = &last_;
@@ -168,17 +162,6 @@ pulse::Nanoseconds Controller::due() const {
   return due;
 }
 
-pulse::Nanoseconds Controller::pollDue() const {
-  pulse::Nanoseconds due = pulse::kNever;
-  for (const auto& axis : context_.axes) {
-    for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
-      const motor::TmcChip* chip = axis->motor.tmcAt(i);
-      if (chip != nullptr) due = std::min({due, pollDue(*chip), sampleDue(*axis, *chip)});
-    }
-  }
-  return due;
-}
-
 // ---- the engine ----
 
 void Controller::on(const EngineNews& news) {
@@ -228,11 +211,7 @@ void Controller::update(axis::AxisModel& axis, const pulse::ChannelState& state)
                     axis.chipAt(state.chip_at_fault).fault_name),
         kChipRemedy);
     axis.distrust();
-    if (motor::TmcChip* chip = axis.registersAt(state.chip_at_fault)) {
-      chip->asks_for_cause = true;
-      chip->polling = 0;  // one under way may have been answered before that
-      chip->next_poll = context_.now;
-    }
+    chip_watch_.askForCause(axis, state.chip_at_fault);
   }
   if (state.ended != before.ended) {
     axis.rest_since = std::min(context_.now, state.end_time + context_.slipped);
@@ -255,9 +234,8 @@ void Controller::update(axis::AxisModel& axis, const pulse::ChannelState& state)
     }
     if (state.end_abrupt && state.end != pulse::EndReason::kDone) axis.distrust();
     const bool at_max = state.end == pulse::EndReason::kEndstopMax;
-    const Activity* const owner = activities_.owner(axis);
-    const bool homes = owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone;
-    if ((at_max || state.end == pulse::EndReason::kEndstopMin) && !homes) axis.noteEndstop(at_max);
+    const bool is_met = at_max || state.end == pulse::EndReason::kEndstopMin;
+    if (is_met && !isBeingHomed(axis)) axis.noteEndstop(at_max);
   }
   if (!was_faulty && axis.fault) axis.noteStop();
 }
@@ -305,7 +283,7 @@ void Controller::supervise() {
                         kTakenOver);
     }
     superviseIdle(*axis);
-    superviseChips(*axis);
+    chip_watch_.supervise(*axis);
   }
   disables_all_ = false;
   activities_.poll();
@@ -383,147 +361,16 @@ void Controller::superviseIdle(axis::AxisModel& axis) {
   activities_.begin(std::make_unique<activity::GoIdle>(context_, axis), kTakenOver);
 }
 
-// ---- chips with a serial port ----
-
-bool Controller::answers(const motor::TmcChip& chip) const {
-  return chip.isSetUp() && context_.mode.powered && context_.mode.closed.empty();
-}
-
-pulse::Nanoseconds Controller::pollDue(const motor::TmcChip& chip) const {
-  return answers(chip) && chip.polling == 0 ? chip.next_poll : pulse::kNever;
-}
-
-// A homing to a stall reads the load itself.
-pulse::Nanoseconds Controller::sampleDue(const axis::AxisModel& axis,
-                                         const motor::TmcChip& chip) const {
-  const bool samples = answers(chip) && chip.measuresLoad() && axis.moving() &&
-                       !chip.isPreparedForStall() && chip.sampling == 0;
-  return samples ? chip.next_sample : pulse::kNever;
-}
-
-void Controller::superviseChips(axis::AxisModel& axis) {
-  const auto moves = [](const axis::AxisModel* any) { return any->moving(); };
-  const bool rests = !axis.fault && !axis.moving() &&
-                     std::none_of(axis.sharers().begin(), axis.sharers().end(), moves);
-  for (std::size_t i = 0; i < axis.motor.chips(); ++i) {
-    motor::TmcChip* chip = axis.motor.tmcAt(i);
-    if (chip == nullptr) continue;
-    if (axis.fault) chip->audit().end();
-    if (!rests) chip->resting_count.reset();
-    endStall(axis, *chip);
-    sampleLoad(axis, *chip);
-    superviseIdleCurrent(axis, *chip);
-    if (context_.now < pollDue(*chip)) continue;
-    const bool audits = rests && context_.now >= chip->next_audit;
-    if (audits) chip->resting_count = axis.motor.countOf(i);
-    bus::RegisterJob job = chip->poll(audits);
-    job.id = chip->polling = context_.newJob();
-    context_.out->register_jobs.push_back(std::move(job));
-  }
-}
-
-void Controller::sampleLoad(const axis::AxisModel& axis, motor::TmcChip& chip) {
-  if (context_.now < sampleDue(axis, chip)) return;
-  chip.sampled_since = context_.now;
-  bus::RegisterJob job = chip.sampleLoad();
-  job.id = chip.sampling = context_.newJob();
-  context_.out->register_jobs.push_back(std::move(job));
-}
-
-void Controller::takeSample(axis::AxisModel& axis, std::size_t motor,
-                            const bus::RegisterDone& done) {
-  motor::TmcChip& chip = *axis.motor.tmcAt(motor);
-  const pulse::Nanoseconds took = context_.now - chip.sampled_since;
-  chip.next_sample = context_.now + std::max(kSamplePeriod, kPauseAfterSample * took);
-  const motion::MotionState planned = axis.motor.stateAt(context_.motionNow());
-  const auto slack = static_cast<double>(axis.motor.state().slack);
-  const std::string fault = chip.takeSample(done, axis.positionOf(planned.position.value() - slack),
-                                            planned.velocity / axis.stepsPerUnit());
-  axis.motor.noteChips();
-  if (!fault.empty() && axis.moving()) failChip(axis, motor, fault);
-}
-
-void Controller::superviseIdleCurrent(const axis::AxisModel& axis, motor::TmcChip& chip) {
-  const bool idle = axis.motor.power().isIdle() && chip.config().idle_current;
-  if (idle == chip.isIdle() || chip.setting_idle != 0 || !answers(chip)) return;
-  if (chip.isPreparedForStall()) return;
-  bus::RegisterJob job = chip.setIdle(idle);
-  job.id = chip.setting_idle = context_.newJob();
-  context_.out->register_jobs.push_back(std::move(job));
-}
-
-// Whatever has ended a homing to a stall: its registers are for nothing else.
-void Controller::endStall(const axis::AxisModel& axis, motor::TmcChip& chip) {
-  if (!chip.isPreparedForStall() || chip.ending_stall != 0 || !chip.isSetUp()) return;
-  const Activity* const owner = activities_.owner(axis);
-  if (owner != nullptr && owner->homingPhase() != axis::HomingPhase::kNone) return;
-  bus::RegisterJob job = chip.endStall();
-  job.id = chip.ending_stall = context_.newJob();
-  context_.out->register_jobs.push_back(std::move(job));
-}
-
 void Controller::on(const bus::RegisterDone& done) {
   context_.register_done = done;
-  if (const auto change = requests_.setting_changes.extract(done.id)) {
-    return takeSetting(change.mapped(), done);
-  }
-  for (const auto& axis : context_.axes) {
-    for (std::size_t i = 0; i < axis->motor.chips(); ++i) {
-      motor::TmcChip* chip = axis->motor.tmcAt(i);
-      if (chip == nullptr) continue;
-      if (chip->polling == done.id) return takePoll(*axis, i, done);
-      if (chip->sampling == done.id) return takeSample(*axis, i, done);
-      const bool sets_idle = chip->setting_idle == done.id;
-      if (!sets_idle && chip->ending_stall != done.id) continue;
-      const std::string why = sets_idle ? chip->takeIdle(done) : chip->takeEndOfStall(done);
-      axis->motor.noteChips();
-      if (!why.empty()) failChip(*axis, i, why);
-      return;
-    }
-  }
-}
-
-void Controller::takePoll(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done) {
-  motor::TmcChip& chip = *axis.motor.tmcAt(motor);
-  chip.polling = 0;
-  chip.next_poll = context_.now + kPollPeriod;
-  // Its supply was switched off meanwhile, or its registers are being written again.
-  if (!chip.isSetUp() || !context_.mode.powered) return;
-  std::string fault = chip.takePoll(done);
-  axis.motor.noteChips();
-  if (std::exchange(chip.asks_for_cause, false)) nameCause(axis, motor, fault);
-  // Without a change meanwhile: of its mode, or by a step that was still on its way.
-  const auto count = std::exchange(chip.resting_count, {});
-  if (fault.empty() && count == axis.motor.countOf(motor)) {
-    chip.next_audit = context_.now + kAuditPeriod;
-    fault = chip.audited(*count, axis.motor.microsteps());
-  }
-  if (!fault.empty()) failChip(axis, motor, fault);
-}
-
-// The fault output says that something is wrong; the registers say what.
-void Controller::nameCause(axis::AxisModel& axis, std::size_t motor, std::string fault) {
-  motor::TmcChip& chip = *axis.motor.tmcAt(motor);
-  if (axis.fault.remedy() != kChipRemedy) return;
-  if (fault.empty()) fault = chip.stallFault();
-  if (!fault.empty()) axis.fault.latch(axis.chipText(motor) + " " + fault, chip.remedy());
-}
-
-void Controller::takeSetting(const RequestContext::SettingChange& change,
-                             const bus::RegisterDone& done) {
-  axis::AxisModel& axis = *context_.axes.at(change.axis);
-  motor::TmcChip& chip = *axis.motor.tmcAt(change.motor);
-  const bool was_set_up = chip.isSetUp();
-  const std::string why = chip.takeSetting(done);
-  axis.motor.noteChips();
+  const auto change = requests_.setting_changes.extract(done.id);
+  if (!change) return chip_watch_.take(done);
+  const RequestContext::SettingChange& setting = change.mapped();
+  axis::AxisModel& axis = *context_.axes.at(setting.axis);
+  const std::string why = chip_watch_.takeSetting(axis, setting.motor, done);
   if (why.empty()) return;
-  change.call->fail({activity::Failure::Kind::kGpio,
-                     axis.name() + ": " + axis.chipText(change.motor) + " " + why});
-  if (was_set_up) failChip(axis, change.motor, why);
-}
-
-void Controller::failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault) {
-  failAxis(axis, axis.chipText(motor) + " " + fault, axis.motor.tmcAt(motor)->remedy());
+  setting.call->fail({activity::Failure::Kind::kGpio,
+                      axis.name() + ": " + axis.chipText(setting.motor) + " " + why});
 }
 
 void Controller::failAxis(axis::AxisModel& axis, const std::string& fault,

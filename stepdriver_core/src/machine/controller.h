@@ -6,6 +6,7 @@
 
 #include "activity/activities.h"
 #include "activity/context.h"
+#include "chip_watch.h"
 #include "flag_checks.h"
 #include "input.h"
 #include "motor/motor_lines.h"
@@ -36,7 +37,7 @@ class Controller {
   pulse::Nanoseconds due() const;
   /// Clock time from which on a TimerDue asks a driver chip how it is. It is no reason for a clock
   /// to go on that stands still while nothing is waited for.
-  pulse::Nanoseconds pollDue() const;
+  pulse::Nanoseconds pollDue() const { return chip_watch_.due(); }
   /// Whether it acts on the levels of inputs; if not, they are read when a request comes.
   bool watchesInputs() const {
     return activities_.watchInputs() || context_.motor_power.watchesInputs() ||
@@ -74,20 +75,6 @@ class Controller {
   void superviseCompares();
   void showIo();
   void superviseIdle(axis::AxisModel& axis);
-  void superviseChips(axis::AxisModel& axis);
-  void takePoll(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done);
-  void takeSetting(const RequestContext::SettingChange& change, const bus::RegisterDone& done);
-  void endStall(const axis::AxisModel& axis, motor::TmcChip& chip);
-  void failChip(axis::AxisModel& axis, std::size_t motor, const std::string& fault);
-  bool answers(const motor::TmcChip& chip) const;
-  /// When a chip is asked how it is; kNever: not, for now.
-  pulse::Nanoseconds pollDue(const motor::TmcChip& chip) const;
-  /// The same for its load in motion.
-  pulse::Nanoseconds sampleDue(const axis::AxisModel& axis, const motor::TmcChip& chip) const;
-  void sampleLoad(const axis::AxisModel& axis, motor::TmcChip& chip);
-  void takeSample(axis::AxisModel& axis, std::size_t motor, const bus::RegisterDone& done);
-  void superviseIdleCurrent(const axis::AxisModel& axis, motor::TmcChip& chip);
-  void nameCause(axis::AxisModel& axis, std::size_t motor, std::string fault);
   pulse::Nanoseconds idleDue(const axis::AxisModel& axis) const;
   AxisSnapshot snapshotOf(const axis::AxisModel& axis) const;
 
@@ -96,6 +83,7 @@ class Controller {
   activity::Activities activities_;
   RequestContext requests_;
   FlagChecks flag_checks_;
+  ChipWatch chip_watch_;
   std::shared_ptr<const IoStates> io_;  // what readers see of the lines with a name
   std::uint64_t stops_concluded_ = 0;   // as MachineSnapshot's
   const EmergencyDisable emergency_disable_;
