@@ -42,13 +42,7 @@ double stepTo(std::int64_t count) { return (static_cast<double>(count) - 0.5) * 
 class PathOutputs : public test::PathBench {
  protected:
   void SetUp() override {
-    options.outputs.resize(2);
-    options.outputs[0].name = "pen";
-    options.outputs[0].line = "pen.line";
-    options.outputs[1].name = "laser";
-    options.outputs[1].line = "laser.line";
-    options.outputs[1].active_level = false;
-    options.outputs[1].at_stop = false;
+    options.outputs = test::penAndLaser();
     options.record_seconds = 60.0;
     axes = {plotterAxis("x"), plotterAxis("y")};
     begin();

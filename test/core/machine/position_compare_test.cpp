@@ -20,6 +20,7 @@
 #include "support/corexy_bench.h"
 #include "support/path_bench.h"
 #include "support/refusal.h"
+#include "support/runs.h"
 #include "support/traced_place.h"
 
 // Outputs that the position of an axis switches. The judge knows only the rig's trace: the joint
@@ -1046,8 +1047,7 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
 };
 
 TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
-  const char* const wanted = std::getenv("STEPDRIVER_MOTIONS");
-  const int runs = wanted != nullptr ? std::atoi(wanted) : 50;
+  const int runs = test::runsOf("STEPDRIVER_MOTIONS", 50);
   for (int run = 0; run < runs; ++run) {
     const int number = GetParam() * 10'000 + run;
     SCOPED_TRACE(number);
@@ -1234,8 +1234,7 @@ class RandomCoreXyCompare : public RandomPositionCompare {
 };
 
 TEST_P(RandomCoreXyCompare, EachPassageOfAnAxisComesOnce) {
-  const char* const wanted = std::getenv("STEPDRIVER_MOTIONS");
-  const int runs = wanted != nullptr ? std::atoi(wanted) : 15;
+  const int runs = test::runsOf("STEPDRIVER_MOTIONS", 15);
   for (int run = 0; run < runs; ++run) {
     const int number = GetParam() * 10'000 + run;
     SCOPED_TRACE(number);

@@ -20,6 +20,7 @@
 #include "support/drawn_course.h"
 #include "support/path_bench.h"
 #include "support/refusal.h"
+#include "support/runs.h"
 #include "support/traced_place.h"
 
 // Random paths that switch outputs, with random commands on the way. The judge knows the geometry
@@ -110,13 +111,7 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
       std::copy(pair.begin(), pair.end(), axes_.begin());
     }
     machine::MachineOptions options;
-    options.outputs.resize(2);
-    options.outputs[0].name = "pen";
-    options.outputs[0].line = "pen.line";
-    options.outputs[1].name = "laser";
-    options.outputs[1].line = "laser.line";
-    options.outputs[1].active_level = false;
-    options.outputs[1].at_stop = false;
+    options.outputs = test::penAndLaser();
     outputs_ = options.outputs;
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes_);
     for (sim::RigAxisSpec& spec : specs) spec.max_switch->position = 100'000.0;
@@ -619,8 +614,7 @@ class RandomPathOutputs : public test::PathBench, public testing::WithParamInter
 };
 
 TEST_P(RandomPathOutputs, EachMarkComesOnceAtItsPlaceOrIsReported) {
-  const char* const wanted = std::getenv("STEPDRIVER_MOTIONS");
-  const int runs = wanted != nullptr ? std::atoi(wanted) : 300;
+  const int runs = test::runsOf("STEPDRIVER_MOTIONS", 300);
   for (int run_number = 0; run_number < runs; ++run_number) {
     const auto number = static_cast<unsigned>(GetParam() * 10'000 + run_number);
     SCOPED_TRACE(number);

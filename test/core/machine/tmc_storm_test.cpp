@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <random>
 #include <string>
@@ -12,6 +11,7 @@
 #include "stepdriver_core/axis/axis.h"
 #include "stepdriver_core/error.h"
 #include "support/bench.h"
+#include "support/runs.h"
 #include "support/tmc_axis.h"
 
 // Random commands to an axis whose driver is on a UART, beside one whose driver has pins only, and
@@ -184,8 +184,7 @@ class TmcStormRun {
 
 // STEPDRIVER_STORMS is how many.
 TEST(TmcStorm, NamesEachTroubleAndLosesNoStepWithoutOne) {
-  const char* const wanted = std::getenv("STEPDRIVER_STORMS");
-  const unsigned storms = wanted == nullptr ? 20U : static_cast<unsigned>(std::atoi(wanted));
+  const auto storms = static_cast<unsigned>(test::runsOf("STEPDRIVER_STORMS", 20));
   for (unsigned seed = 1; seed <= storms && !testing::Test::HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     TmcStormRun(seed).play();

@@ -89,6 +89,18 @@ inline double distanceTo(const Place& point, const Place& a, const Place& b) {
   return std::hypot(point[0] - a[0] - part * x, point[1] - a[1] - part * y);
 }
 
+/// The outputs of a plotter: a pen, and a laser that a stop switches off.
+inline std::vector<config::OutputConfig> penAndLaser() {
+  std::vector<config::OutputConfig> outputs(2);
+  outputs[0].name = "pen";
+  outputs[0].line = "pen.line";
+  outputs[1].name = "laser";
+  outputs[1].line = "laser.line";
+  outputs[1].active_level = false;
+  outputs[1].at_stop = false;
+  return outputs;
+}
+
 /// Two plotter axes, x and y.
 class PathBench : public TrajectoryBench {
  protected:
