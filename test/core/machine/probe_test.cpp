@@ -1,17 +1,16 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "stepdriver_core/error.h"
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
+#include "support/constants.h"
 #include "support/passing_lines.h"
 #include "support/refusal.h"
 
@@ -131,38 +130,6 @@ TEST_F(ProbeTest, TouchesASecondTimeAndGoesBackToTheContact) {
   EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
   EXPECT_NEAR(result.contact.at(0), 0.02 - 0.5 * kStep, 1e-8);
   EXPECT_NEAR(bench->axis().state().position, result.contact.at(0), 0.51 * kStep);
-}
-
-TEST_F(ProbeTest, AThousandContactsAreWithinHalfAStepOfTheRigsPlace) {
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> places(1.0, 45.0);
-  std::uniform_real_distribution<double> speeds(0.001, 0.1);
-  std::uniform_real_distribution<double> others(-0.05, 0.05);
-  double worst = 0.0;
-  for (int i = 0; i < 1000; ++i) {
-    const double place = places(random);
-    // Bouncing, with a debounce time or without, and a switch that opens later than it closes.
-    build({place, i % 2 == 0 ? 0.2 : 0.0, i % 3 == 0 ? 5 : 0, i % 6 == 0 ? 2'000'000 : 0});
-    ProbeRequest request = towards(0.05);
-    request.velocity = speeds(random);
-    if (i % 5 == 0) {
-      request.second_velocity = 0.002;
-      request.back_off = 0.001;
-    }
-    if (i % 7 == 0) {
-      request.names.emplace_back("y");
-      request.positions.push_back(others(random));
-    }
-    request.returns = i % 4 == 0;
-    const ProbeResult result = probe(request);
-    ASSERT_EQ(result.end, ProbeEnd::kContact) << i << ": " << result.message;
-    // The first step at or beyond its place presses it.
-    const double step = std::ceil(place * 80.0 - 1e-6) / 80'000.0;
-    worst = std::max(worst, std::abs(result.contact.at(0) - step));
-    ASSERT_LE(worst, 0.5 * kStep + 1e-9) << i;
-    ASSERT_LE(result.positions.at(0), 0.05 + 1e-9);
-  }
-  RecordProperty("worst_in_thousandths_of_a_step", static_cast<int>(1e3 * worst / kStep));
 }
 
 TEST_F(ProbeTest, WhoseSwitchOpensTooLateForTheSecondTouchSaysSo) {
@@ -360,6 +327,53 @@ TEST_F(ProbeTest, IsRefusedIfAnAxisMovesOrTheNumbersAreWrong) {
   EXPECT_EQ(bench->pulses(), 0);
   bench->axis().moveTo(0.01);
   EXPECT_REFUSED(probe(towards(0.05)), "it moves; a probing begins at rest");
+}
+
+// A round has 3200 steps, and the probe is pressed from 30 to 60 degrees.
+TEST(ProbeOfARotaryAxis, FindsTheAngleInEitherDirectionAndBeyondARound) {
+  constexpr double kRound = 2.0 * test::kPi;
+  constexpr double kAngle = kRound / 3200.0;
+  config::AxisConfig config = linearAxis("x", 1.0 / kAngle, 3.0, 30.0);
+  config.kind = config::Kind::kRotary;
+  config.continuous = true;
+  config.endstop_min.reset();
+  config.endstop_max.reset();
+  std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
+  specs[0].full_step_travel = 360.0 / 200.0;
+  sim::SwitchSpec contact;
+  contact.line = "io.probe";
+  contact.active_level = true;
+  contact.position = 30.0;
+  contact.end = 60.0;
+  contact.every = 360.0;
+  specs[0].flags.push_back(contact);
+  machine::MachineOptions options;
+  options.inputs.emplace_back();
+  options.inputs[0].name = "probe";
+  options.inputs[0].line = {"io.probe", true, Bias::kAsIs};
+  Bench bench({config}, specs, false, 0.0, options);
+  bench.axis().setPosition(0.0);
+  const auto expect_contact = [&](double to, double velocity, double place) {
+    ProbeRequest request;
+    request.input = "probe";
+    request.names = {"x"};
+    request.positions = {to};
+    request.velocity = velocity;
+    request.second_velocity = 0.1;
+    request.back_off = 0.2;
+    const ProbeResult result = bench.machine->probe(request);
+    EXPECT_EQ(result.end, ProbeEnd::kContact) << result.message;
+    ASSERT_EQ(result.contact.size(), 1U);
+    // The first step at or beyond the edge presses it, half a step before it is there.
+    const double step =
+        to > 0.0 ? std::ceil(place / kAngle - 1e-6) - 0.5 : std::floor(place / kAngle + 1e-6) + 0.5;
+    EXPECT_NEAR(result.contact[0] / kAngle, step, 1e-5) << place;
+  };
+  expect_contact(kRound, 1.0, kRound / 12.0);
+  bench.move(2.5 * kRound);
+  expect_contact(10.0 * kRound, 3.0, (3.0 + 1.0 / 12.0) * kRound);
+  bench.move(-0.5 * kRound);
+  expect_contact(-10.0 * kRound, 2.0, (-1.0 + 1.0 / 6.0) * kRound);
 }
 
 TEST(UnreadableProbe, MovesNothingAndEndsAMotion) {
