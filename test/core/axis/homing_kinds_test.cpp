@@ -536,18 +536,6 @@ TEST_F(HomingToFlagTest, SaysThatAnIndexIsStuckActive) {
                "the index index didn't come within a turn of the edge of the input flag");
 }
 
-// ---- the final position ----
-
-TEST_F(HomingKindsTest, StandsAtTheFinalPositionWithANumberOfItsOwn) {
-  config::AxisConfig config = homingAxis();
-  config.homing->final_position = 0.03;
-  build(config, {}, [](sim::RigAxisSpec& /*spec*/) {});
-  const HomingResult result = x().home();
-  EXPECT_EQ(result.end, HomingEnd::kHomed) << result.message;
-  EXPECT_NEAR(result.position, 0.03, kStep);
-  EXPECT_NEAR(carriage(), 0.03, 1.5 * kStep);
-}
-
 // ---- where it stands ----
 
 TEST_F(HomingKindsTest, ADirectHomingMakesNoStep) {

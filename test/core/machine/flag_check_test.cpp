@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "support/constants.h"
-#include "support/homing_bench.h"
+#include "support/corexy_bench.h"
+#include "support/gantry_bench.h"
+#include "support/homing_kinds_bench.h"
 
 // Lost steps, seen when an axis passes the flag of its homing again: 80 steps/mm, the flag is from
 // 20 mm to 30 mm on the rig, and the positions are those of the rig.
@@ -218,6 +220,100 @@ TEST_F(FlagCheckTest, OnAnAxisThatTurnsWithoutEndChecksEachTurn) {
   push(7.2);
   EXPECT_EQ(bench->move(-20.0 * kPi).end, axis::MoveEnd::kFault);
   EXPECT_EQ(fault(), "lost steps: the flag flag came 7.2 deg late");
+}
+
+// The flag is checked, not the index that comes after it.
+TEST(FlagCheckOfAnIndex, FindsLostStepsAtTheFlag) {
+  config::AxisConfig config = test::indexAxis("flag");
+  config.homing->offset = 0.038;
+  config.homing->final_position = 0.0;
+  config.homing->check_at_flag = FlagCheck::kFault;
+  config.homing->flag_tolerance = 0.0002;
+  std::vector<sim::RigAxisSpec> specs = Bench::rigAxes({config});
+  specs[0].flags = {test::flagOf("flag", 20.0, 30.0), test::flagOf("index", 38.0, 38.1)};
+  specs[0].flags[1].every = 40.0;
+  machine::MachineOptions options;
+  options.inputs = {test::inputNamed("flag"), test::inputNamed("index")};
+  Bench bench({config}, specs, false, 0.0, options);
+  axis::Axis& x = bench.axis();
+  for (const double lost : {0.8, -0.8}) {
+    const axis::HomingResult homed = x.home();
+    ASSERT_EQ(homed.end, axis::HomingEnd::kHomed) << homed.message;
+    for (const double place : {0.06, -0.03, 0.09, -0.05, 0.0}) {
+      EXPECT_EQ(bench.move(place).end, axis::MoveEnd::kReached) << place;
+    }
+    ASSERT_EQ(x.state().fault, "");
+    bench.rig.placeCarriage("x", bench.report().carriage + lost, bench.clock.now());
+    EXPECT_EQ(bench.move(0.06).end, axis::MoveEnd::kFault);
+    EXPECT_EQ(x.state().fault, lost > 0.0 ? "lost steps: the flag flag came 0.8 mm early"
+                                          : "lost steps: the flag flag came 0.8 mm late");
+    EXPECT_FALSE(x.state().homed);
+    bench.machine->recover();
+  }
+}
+
+// The motor that is looked at has lost steps, or the other one, which is made square by homings.
+TEST(FlagCheckOfAGantry, FindsThatTheMotorWithTheFlagHasLostSteps) {
+  config::AxisConfig config = test::gantryAxis();
+  config.max_skew = 0.0;
+  config.homing = checkedAxis().homing;
+  std::vector<sim::RigAxisSpec> specs = test::rigMotors(config);
+  specs[0].flags = {test::flagOf("flag", 20.0, 30.0)};
+  machine::MachineOptions options;
+  options.inputs = {test::inputNamed("flag")};
+  Bench bench({config}, specs, false, 0.0, options);
+  axis::Axis& y = bench.axis("y");
+  const auto push = [&](const std::string& motor) {
+    bench.rig.placeCarriage(motor, bench.report(motor).carriage - 0.8, bench.clock.now());
+  };
+  const axis::HomingResult homed = y.home();
+  ASSERT_EQ(homed.end, axis::HomingEnd::kHomed) << homed.message;
+  for (const double place : {0.06, -0.02, 0.07, -0.01}) {
+    EXPECT_EQ(bench.move(place, "y").end, axis::MoveEnd::kReached) << place;
+  }
+  push("y.right");
+  EXPECT_EQ(bench.move(0.06, "y").end, axis::MoveEnd::kReached) << "no flag tells of it";
+  bench.move(-0.01, "y");
+  push("y");
+  EXPECT_EQ(bench.move(0.06, "y").end, axis::MoveEnd::kFault);
+  EXPECT_EQ(y.state().fault, "lost steps: the flag flag came 0.8 mm late");
+  EXPECT_FALSE(y.state().position_valid);
+}
+
+// Each of its motors is behind by an electrical cycle, and the flag is one of x.
+TEST(FlagCheckOfACoreXy, FindsLostStepsOfItsAxisWhateverTheOtherOneDoes) {
+  for (const HomingKind kind : {HomingKind::kFlag, HomingKind::kFlagCentre}) {
+    std::vector<config::AxisConfig> axes = test::coreXyAxes();
+    axes[0].homing = checkedAxis(FlagCheck::kFault, kind).homing;
+    axes[0].homing->seek_speed = 0.02;  // from which the motors stop at once
+    std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
+    specs[0].flags = {test::flagOf("flag", 20.0, 30.0)};
+    machine::MachineOptions options;
+    options.inputs = {test::inputNamed("flag")};
+    Bench bench(axes, specs, false, 0.0, options);
+    bench.axis("y").setPosition(0.0);
+    const axis::HomingResult homed = bench.axis().home();
+    ASSERT_EQ(homed.end, axis::HomingEnd::kHomed) << homed.message;
+    std::mt19937 random(9);
+    std::uniform_real_distribution<double> places(-0.02, 0.06);
+    for (int i = 0; i < 30; ++i) {
+      // Each of them alone, or both at once.
+      const axis::Move of_x = bench.axis().moveTo(places(random));
+      if (i % 3 != 0) bench.axis("y").wait(bench.axis("y").moveTo(places(random)));
+      EXPECT_EQ(bench.axis().wait(of_x).end, axis::MoveEnd::kReached);
+      ASSERT_EQ(bench.axis().state().fault, "") << i;
+    }
+    bench.move(0.0);
+    bench.rig.placeCarriage("x", bench.report().carriage - 0.8, bench.clock.now());
+    ASSERT_NEAR(bench.report().carriage, -0.8, 0.02);
+    bench.axis("y").moveTo(0.03);
+    EXPECT_EQ(bench.move(0.06).end, axis::MoveEnd::kFault);
+    // The step that meets the flag may be one of y.
+    const std::string fault = bench.axis().state().fault;
+    EXPECT_EQ(fault.rfind("lost steps: the flag flag came 0.80", 0), 0U) << fault;
+    EXPECT_EQ(fault.substr(fault.size() - 8), " mm late");
+    EXPECT_FALSE(bench.axis().state().position_valid);
+  }
 }
 
 }  // namespace
