@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "stepdriver_core/machine/machine.h"
 #include "support/bench.h"
 #include "support/refusal.h"
+#include "support/traced_place.h"
 
 // Positions latched at edges of an input, on the rig: 80 steps/mm.
 
@@ -94,8 +96,10 @@ TEST_F(LatchTest, TakesEveryEdgeOfAMotionWithItsNumber) {
     const bool up = i < 20;
     const double way = static_cast<double>(up ? i : 39 - i);
     const double place = 0.002 + 0.005 * std::floor(way / 2) + 0.001 * std::fmod(way, 2.0);
-    // A flag ends at the first step beyond it.
-    EXPECT_NEAR(edges[i].axes[0].position, place, 1.01 * kStep) << i;
+    // A flag begins with the step to it and ends with the first step beyond it, and a step is made
+    // half a step before its place.
+    const double ahead = edges[i].active ? -0.5 * kStep : 0.5 * kStep;
+    EXPECT_NEAR(edges[i].axes[0].position, place + (up ? ahead : -ahead), 1.1e-10) << i;
   }
   bench->machine->end(every);
   const LatchResult result = bench->machine->wait(every);
@@ -112,14 +116,16 @@ TEST_F(LatchTest, HasThePositionOfTheFirstContactIfTheInputBounces) {
   EXPECT_NEAR(result.edge->axes[0].position, 0.002 - 0.5 * kStep, 1e-8);
 }
 
+// An edge comes with a step of x, which is made where x crosses the middle between two counts: that
+// place is known exactly. y moves meanwhile, and is known by its steps before and after that time.
 TEST_F(LatchTest, IsExactInRandomMotionsWithHoldsOverridesAndStops) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> places(-0.05, 0.05);
   const Latch every = latch(LatchEdge::kEither, true);
-  std::size_t seen = 0;
   for (int i = 0; i < 60; ++i) {
     axis::Axis& x = bench->axis();
     const axis::Move move = x.moveTo(places(random));
+    const axis::Move beside = bench->axis("y").moveTo(places(random));
     bench->machine->advance(0.05 + 0.3 * std::abs(places(random)) * 20.0);
     switch (i % 4) {
       case 0:
@@ -137,14 +143,26 @@ TEST_F(LatchTest, IsExactInRandomMotionsWithHoldsOverridesAndStops) {
         break;
     }
     x.wait(move);
-    for (const LatchedEdge& edge : every.record->take()) {
-      ++seen;
-      // Each edge is at a border of a flag, to a step.
-      const double in = std::remainder(edge.axes[0].position - 0.0025, 0.005);
-      EXPECT_NEAR(std::abs(in), 0.0005, 1.01 * kStep) << i;
-    }
+    bench->axis("y").wait(beside);
   }
-  EXPECT_GT(seen, 100U);
+  // At 0.1 m/s, an axis moves 1e-10 m in the nanosecond to which times are rounded.
+  constexpr double kRounding = 1.1e-10 / kStep;
+  const std::vector<LatchedEdge> edges = every.record->take();
+  const std::vector<std::int64_t> rises = bench->trace->times("x", "flag1", true);
+  const std::vector<std::int64_t> falls = bench->trace->times("x", "flag1", false);
+  EXPECT_EQ(edges.size(), rises.size() + falls.size());
+  EXPECT_GT(edges.size(), 100U);
+  const test::TracedMotor x(*bench->trace, "x", 1.02 / kStep, 0.0);
+  const test::TracedMotor y(*bench->trace, "y", 1.02 / kStep, 0.0);
+  for (const LatchedEdge& edge : edges) {
+    const auto& times = edge.active ? rises : falls;
+    EXPECT_EQ(std::count(times.begin(), times.end(), edge.time), 1);
+    const auto time_ns = static_cast<double>(edge.time);
+    EXPECT_EQ(x.at(time_ns).error, 0.0);
+    EXPECT_NEAR(edge.axes[0].position / kStep, x.at(time_ns).place, kRounding) << edge.number;
+    EXPECT_NEAR(edge.axes[1].position / kStep, y.at(time_ns).place, y.at(time_ns).error + kRounding)
+        << edge.number;
+  }
 }
 
 TEST_F(LatchTest, CountsOnlyEdgesWithinItsWindow) {
