@@ -119,7 +119,10 @@ class Rig::Impl {
     if (known.second) lines.emplace_back();
     return static_cast<int>(known.first->second);
   }
-  Line& lineOf(const std::string& line) { return at(indexOf(line)); }
+  Line& lineOf(const std::string& line) {
+    if (line.empty()) throw Error("a line of the rig has an empty name, which is that of no line");
+    return at(indexOf(line));
+  }
   Line& at(int line) { return lines[static_cast<std::size_t>(line)]; }
 
   /// Reports the latest changes of switches to the trace and the listeners.

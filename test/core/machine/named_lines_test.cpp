@@ -476,5 +476,33 @@ TEST(NamedInput, ThatBouncesChangesOnceAtItsFirstEdge) {
   EXPECT_EQ(changes, 3);
 }
 
+TEST(NamedInputs, AreRequestedWithTheirBiasAndTheirEdges) {
+  machine::MachineOptions options;
+  const std::vector<Bias> biases{Bias::kAsIs, Bias::kPullUp, Bias::kPullDown, Bias::kDisabled};
+  for (const Bias bias : biases) {
+    options.inputs.push_back(input("probe" + std::to_string(options.inputs.size())));
+    options.inputs.back().line.bias = bias;
+  }
+  const std::vector<config::AxisConfig> axes{linearAxis("x")};
+  sim::Rig rig(Bench::rigAxes(axes), nullptr, {}, {}, Bench::ioOf(options));
+  pulse::VirtualClock clock;
+  gpio::SimulatedBackend simulated(rig, [&clock] { return clock.now(); });
+  std::vector<gpio::InputRequest> requested;
+  test::MakingBackend backend([&](const auto& outputs, const auto& inputs) {
+    requested = inputs;
+    return simulated.request(outputs, inputs);
+  });
+  const test::UnthreadedMachine machine(axes, backend, clock, options);
+  for (std::size_t i = 0; i < biases.size(); ++i) {
+    const std::string line = options.inputs[i].line.line;
+    const auto found =
+        std::find_if(requested.begin(), requested.end(),
+                     [&](const gpio::InputRequest& request) { return request.line == line; });
+    ASSERT_NE(found, requested.end()) << line;
+    EXPECT_EQ(found->bias, biases[i]) << line;
+    EXPECT_TRUE(found->edges) << line;
+  }
+}
+
 }  // namespace
 }  // namespace stepdriver

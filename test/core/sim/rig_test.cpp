@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -237,6 +238,21 @@ TEST(Rig, RefusesAxesThatItHasNot) {
   EXPECT_THROW(bench.rig.report("y"), Error);
   EXPECT_THROW(bench.rig.setFaults("y", {}), Error);
   EXPECT_THROW(bench.rig.placeCarriage("y", 0.0, 0), Error);
+}
+
+TEST(Rig, SaysThatAPinThatIsNotWiredHasNoLine) {
+  Rig rig({plainAxis("a4988")});
+  for (const auto& call : std::vector<std::function<void()>>{
+           [&] { rig.failWrites("", 0, EIO); }, [&] { rig.clearWriteFault(""); },
+           [&] { rig.stickInput("", true, 0); }, [&] { rig.outputLevel(""); },
+           [&] { rig.setInput("", true, 0); }}) {
+    try {
+      call();
+      ADD_FAILURE() << "it was accepted";
+    } catch (const Error& error) {
+      EXPECT_STREQ(error.what(), "a line of the rig has an empty name, which is that of no line");
+    }
+  }
 }
 
 }  // namespace

@@ -347,6 +347,10 @@ class Rig : public gpio::Board {
   /// The write that comes after `writes` more successful ones on this line fails with `error` (an
   /// errno), and so do all after it until clearWriteFault(). A write that fails because of another
   /// line may count.
+  ///
+  /// @throw Error if the name is empty, as it is of a pin that isn't wired; so do all functions
+  /// that
+  ///   take a line.
   void failWrites(const std::string& line, std::int64_t writes, int error);
   /// Writes of this line succeed again.
   void clearWriteFault(const std::string& line);
