@@ -69,6 +69,7 @@ TEST_F(Probing, TouchesTwiceAndGoesBackToTheContact) {
   EXPECT_TRUE(response.contact);
   ASSERT_EQ(response.contact_position.size(), 1U);
   EXPECT_NEAR(response.contact_position[0], 0.03 - kHalfStep, 1e-8);
+  EXPECT_FALSE(response.contact_was_read);
   ASSERT_EQ(response.position.size(), 1U);
   EXPECT_NEAR(response.position[0], response.contact_position[0], 1.01 * kHalfStep);
 }
@@ -195,6 +196,50 @@ TEST_F(Probing, AnotherActionLatchesTheFirstEdgeOrPublishesEach) {
   goal.edge = 3;
   EXPECT_EQ(every.run(goal), State::REJECTED);
   expectSays(every.getResult()->message, "edge is 3, but must be 0 (ACTIVE)");
+}
+
+// The rig's line reports that the switch closes, and none of its bounces, which take a second each.
+TEST_F(Probing, AnEdgeThatNoLineHasReportedIsMarkedAsRead) {
+  node.set("inputs/touch/pin", "touch");
+  node.set("inputs/touch/active_level", "high");
+  node.set("inputs/touch/debounce_ms", 0.0);
+  node.set("simulation/inputs/touch/bounces", 1000);
+  node.set("simulation/inputs/touch/bounce_ms", 1000.0);
+  start(1.0);
+  MotionClient<LatchAction> client(node.full("latch"));
+  const Recorder<LatchedPositions> edges(node.full("latched_positions"));
+  ASSERT_TRUE(waitUntil([&] { return edges.connected(); }));
+  LatchGoal goal;
+  goal.input = "touch";
+  goal.edge = LatchGoal::EITHER;
+  goal.every = true;
+  client.sendGoal(goal);
+  ASSERT_TRUE(waitUntil([&] { return client.getState() == State::ACTIVE; }));
+  std_srvs::SetBool::Request pressed;
+  pressed.data = true;
+  EXPECT_TRUE(node.call<std_srvs::SetBool>("rig/inputs/touch", pressed).success);
+  ASSERT_TRUE(waitUntil([&] { return edges.count() >= 2; }));
+  EXPECT_TRUE(edges.messages()[0].active);
+  EXPECT_FALSE(edges.messages()[0].was_read);
+  EXPECT_TRUE(edges.messages()[1].was_read);
+  auto request = towards<Probe::Request>(0.03);
+  request.input = "touch";
+  request.away = true;
+  request.velocity = 0.001;
+  Probe::Response response;
+  ASSERT_TRUE(waitUntil([&] {
+    response = probe(request);
+    return !response.position.empty();
+  })) << response.message;
+  EXPECT_TRUE(response.success) << response.message;
+  EXPECT_TRUE(response.contact_was_read);
+  MotionClient<ProbeAction> action(node.full("probe"));
+  auto again = towards<ProbeGoal>(-0.03);
+  again.input = "touch";
+  again.away = true;
+  again.velocity = 0.001;
+  ASSERT_TRUE(waitUntil([&] { return action.run(again) == State::SUCCEEDED; }));
+  EXPECT_TRUE(action.getResult()->contact_was_read);
 }
 
 }  // namespace

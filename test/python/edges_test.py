@@ -39,6 +39,7 @@ class Edges(support.MachineTest):
         self.assertAlmostEqual(result.edge.positions["y"], 0.01, delta=0.0125e-3)
         self.assertEqual(result.edge.valid, {"x": True, "y": True})
         self.assertTrue(0.0 < result.edge.time < self.machine.time)
+        self.assertFalse(result.edge.was_read)
         self.assertEqual([edge.number for edge in latch.edges()], [1])
         self.assertEqual(latch.edges(), [])
         self.machine.shutdown()
@@ -85,6 +86,7 @@ class Edges(support.MachineTest):
         self.assertEqual(result.end, ProbeEnd.CONTACT)
         self.assertTrue(result.succeeded)
         self.assertAlmostEqual(result.contact["x"], 0.05, delta=0.0125e-3)
+        self.assertFalse(result.was_read)
         self.assertGreater(result.positions["x"], 0.05)
         self.assertEqual(result.positions["x"], self.x.position)
 
@@ -114,6 +116,38 @@ class Edges(support.MachineTest):
         with self.assertRaisesRegex(Refused, "pin"):
             self.machine.probe("pin", {"x": 0.06})
         self.assertEqual(self.x.position, 0.0)
+
+
+class LostEdges(support.MachineTest):
+    """The rig's lines report how a switch closes, but not how it bounces: half a second later it opens for as long."""
+
+    CONFIG = {
+        "axes": {"x": support.axis()},
+        "inputs": {"flag": {"pin": "GPIO12", "active_level": "low"}},
+        "simulation": {"inputs": {"flag": {"axis": "x", "from_mm": 20.0, "to_mm": 60.0, "bounces": 1,
+                                           "bounce_ms": 500.0}}},
+    }
+
+    def setUp(self):
+        super().setUp()
+        self.x.set_position(0.0)
+
+    def test_of_a_latch_are_told_of(self):
+        latch = self.machine.latch("flag", edge="either", every=True)
+        self.x.move_to(0.025).wait()
+        self.machine.advance(1.0)
+        closed, opened, closed_again = latch.edges()
+        self.assertEqual([closed.was_read, opened.was_read, closed_again.was_read], [False, True, True])
+        self.assertAlmostEqual(opened.time, closed.time + 0.5, delta=0.011)
+        latch.end()
+        self.assertTrue(latch.wait().edge.was_read)
+
+    def test_of_a_probing_are_told_of(self):
+        self.x.move_to(0.021).wait()
+        result = self.machine.probe("flag", {"x": 0.05}, away=True, velocity=0.01)
+        self.assertEqual(result.end, ProbeEnd.CONTACT)
+        self.assertTrue(result.was_read)
+        self.assertIn("the kernel has reported no edge", result.message)
 
 
 if __name__ == "__main__":

@@ -166,8 +166,8 @@ py::dict valueOf(const machine::LatchedEdge& edge) {
     valid[py::str(axis.name)] = axis.position_valid;
   }
   return py::dict("number"_a = edge.number, "active"_a = edge.active,
-                  "time"_a = static_cast<double>(edge.time) * 1e-9, "positions"_a = positions,
-                  "valid"_a = valid);
+                  "time"_a = static_cast<double>(edge.time) * 1e-9, "was_read"_a = edge.was_read,
+                  "positions"_a = positions, "valid"_a = valid);
 }
 
 py::dict valueOf(const machine::LatchResult& result) {
@@ -178,7 +178,7 @@ py::dict valueOf(const machine::LatchResult& result) {
 py::dict valueOf(const machine::ProbeResult& result) {
   return py::dict("end"_a = nameOf(result.end), "succeeded"_a = result.succeeded,
                   "message"_a = result.message, "contact"_a = result.contact,
-                  "positions"_a = result.positions);
+                  "was_read"_a = result.was_read, "positions"_a = result.positions);
 }
 
 py::dict valueOf(const machine::EngineFigures& figures) {

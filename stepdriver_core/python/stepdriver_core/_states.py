@@ -242,6 +242,8 @@ class LatchedEdge:
     """The input became active; False: inactive."""
     time: float
     """[s] on the clock of ``Machine.time``, by the kernel's time stamp of the edge."""
+    was_read: bool
+    """The kernel has lost the edge: the time is that of the reading that shows the level."""
     positions: Dict[str, float]
     """[m or rad] of the axes at that time, by their names."""
     valid: Dict[str, bool]
@@ -282,6 +284,8 @@ class ProbeResult:
     """A sentence that says how it ended."""
     contact: Optional[Dict[str, float]]
     """[m or rad] where the axes were at the last contact, by their names; None: there was none."""
+    was_read: bool
+    """The kernel has lost its edge: they were there when the input was read."""
     positions: Dict[str, float]
     """[m or rad] where they stand."""
 

@@ -37,9 +37,10 @@ ProbeResult Probing::run() {
   result_.succeeded = true;
   end(ProbeEnd::kContact,
       fmt::format("there was a contact at the input {}{}", request_.input,
-                  was_read_ ? "; the kernel has reported no edge, so its place is where the axes "
-                              "were when the input was read"
-                            : ""));
+                  result_.was_read
+                      ? "; the kernel has reported no edge, so its place is where the axes "
+                        "were when the input was read"
+                      : ""));
   return result_;
 }
 
@@ -59,8 +60,9 @@ bool Probing::take(const ProbeStrokeResult& touched, const char* which) {
   const bool is_second = !result_.contact.empty();
   result_.positions = touched.line.positions;
   result_.contact.clear();
+  result_.was_read = false;
   if (touched.latched.latched) {
-    was_read_ = touched.latched.edge->was_read;
+    result_.was_read = touched.latched.edge->was_read;
     for (const LatchedAxis& axis : touched.latched.edge->axes) {
       result_.contact.push_back(axis.position);
     }

@@ -52,7 +52,6 @@ class Probing {
   const Means means_;
   std::vector<double> begin_;    // [unit] those of the first touch
   std::vector<double> targets_;  // [unit]
-  bool was_read_ = false;        // the kernel has reported no edge of the latest contact
   ProbeResult result_;
 };
 

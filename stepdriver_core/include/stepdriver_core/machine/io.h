@@ -113,7 +113,7 @@ struct LatchedEdge {
   /// first contact.
   pulse::Nanoseconds time = 0;
   /// The kernel has reported no such edge: it has lost it, and the time is that of the reading that
-  /// shows the level. LatchResult::message and that of a probing say so.
+  /// shows the level. LatchResult::message says so of the edge that ends a latch.
   bool was_read = false;
   std::vector<LatchedAxis> axes;
 };
@@ -204,6 +204,9 @@ struct ProbeResult {
   bool succeeded = false;         ///< there was a contact, or it need not be
   std::string message;            ///< a sentence that says how it ended
   std::vector<double> contact;    ///< [unit] of the last touch; empty if there was none
+  /// The kernel has reported no edge of it: the contact is where the axes were when the input was
+  /// read, as LatchedEdge::was_read. The message says so.
+  bool was_read = false;
   std::vector<double> positions;  ///< [unit] where the axes stand
 };
 

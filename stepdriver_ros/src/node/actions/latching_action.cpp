@@ -79,6 +79,7 @@ LatchedPositions LatchingAction::messageOf(const Latching& latching,
   message.input = latching.handle.getGoal()->input;
   message.number = edge.number;
   message.active = edge.active;
+  message.was_read = edge.was_read;
   for (const machine::LatchedAxis& axis : edge.axes) {
     message.name.push_back(axis.name);
     message.position.push_back(axis.position);

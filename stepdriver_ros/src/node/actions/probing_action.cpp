@@ -59,6 +59,7 @@ void ProbingAction::probe(Goals::GoalHandle& handle, const std::function<bool()>
     answer.end = numberOf(result.end);
     answer.message = result.message;
     answer.contact_position = result.contact;
+    answer.contact_was_read = result.was_read;
     answer.position = result.positions;
   } catch (const std::exception& error) {
     answer.message = error.what();

@@ -203,6 +203,7 @@ void MachineServices::advertiseCoordinatedMoves(machine::Machine& machine) {
           response.message = std::move(result.message);
           response.contact = !result.contact.empty();
           response.contact_position = std::move(result.contact);
+          response.contact_was_read = result.was_read;
           response.position = std::move(result.positions);
         });
       };
