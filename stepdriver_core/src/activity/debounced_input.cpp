@@ -36,11 +36,14 @@ bool DebouncedInput::poll(const Context& context) {
   return true;
 }
 
-// Edges are reported before the level that was read after them. Those of one change are no further
-// apart than the time for which a level must stay.
+// Edges are reported before the level that was read after them, unless another thread has read it.
+// Those of one change are no further apart than the time for which a level must stay.
 void DebouncedInput::noteChange(const Context& context, bool has_changed) {
+  const bool is_new = !left_;
+  if (is_new) stable_since_ = level_since_;
+  const bool begins = is_new || left_was_read_;
   const std::vector<gpio::EdgeEvent> edges =
-      context.levels.since(line_, left_ ? quiet_since_ : level_since_);
+      context.levels.since(line_, begins ? stable_since_ : quiet_since_);
   const bool tells = !edges.empty() && (!has_changed || edges.back().level == (*level_ > 0));
   const auto time_of = [&](std::size_t edge) { return std::min(edges[edge].time_ns, context.now); };
   if (tells) {
@@ -48,7 +51,7 @@ void DebouncedInput::noteChange(const Context& context, bool has_changed) {
   } else if (has_changed) {
     quiet_since_ = context.now;
   }
-  if (left_) return;
+  if (!is_new && !(begins && tells)) return;
   left_ = quiet_since_;
   left_was_read_ = !tells;
   for (std::size_t i = edges.size(); tells && i-- > 0;) {

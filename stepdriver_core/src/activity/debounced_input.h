@@ -48,6 +48,7 @@ class DebouncedInput {
   std::optional<int> level_;                // as read last; empty: before begin()
   pulse::Nanoseconds level_since_ = 0;      // when that was read first
   std::optional<pulse::Nanoseconds> left_;  // when its level began to change
+  pulse::Nanoseconds stable_since_ = 0;     // when the level before that was read first
   pulse::Nanoseconds quiet_since_ = 0;      // the latest change of its level after that
   pulse::Nanoseconds polled_at_ = 0;
   bool active_ = false;

@@ -27,7 +27,7 @@ std::vector<InputEdges::Edge> InputEdges::poll(const Context& context) {
     differs_.reset();
   } else if (!differs_) {
     differs_ = context.now;
-  } else if (context.now - *differs_ >= kLongestReport) {
+  } else if (context.levels.edgesAddedUntil() >= edgesDue()) {
     add(level > 0, *differs_, true, edges);
   }
   return edges;
@@ -40,11 +40,6 @@ void InputEdges::add(bool level, pulse::Nanoseconds time, bool was_read, std::ve
   if (level == level_) return;
   level_ = level;
   edges.push_back({level == active_level_, time, was_read});
-}
-
-pulse::Nanoseconds InputEdges::due() const {
-  const pulse::Nanoseconds own = differs_ ? *differs_ + kLongestReport : pulse::kNever;
-  return std::min(own, input_.due());
 }
 
 }  // namespace stepdriver::activity

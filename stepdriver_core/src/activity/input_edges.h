@@ -14,7 +14,7 @@ namespace stepdriver::activity {
 /// counts, however short the pulse.
 class InputEdges {
  public:
-  /// An edge is reported within this time after another level is read, or it is lost.
+  /// The kernel reports an edge within this time after another level is read, or it is lost.
   static constexpr pulse::Nanoseconds kLongestReport = 5'000'000;
 
   struct Edge {
@@ -40,7 +40,12 @@ class InputEdges {
     return differs_ ? differs_ : input_.bouncesSince();
   }
   /// Clock time by which poll() must be called.
-  pulse::Nanoseconds due() const;
+  pulse::Nanoseconds due() const { return input_.due(); }
+  /// Clock time until which all reported edges must be known, to tell whether one was lost;
+  /// pulse::kNever: no edge is missing.
+  pulse::Nanoseconds edgesDue() const {
+    return differs_ ? *differs_ + kLongestReport : pulse::kNever;
+  }
 
  private:
   void add(bool level, pulse::Nanoseconds time, bool was_read, std::vector<Edge>& edges);

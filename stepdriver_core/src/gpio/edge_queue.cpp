@@ -13,10 +13,7 @@ int EdgeQueue::pop(std::int64_t timeout_ns, EdgeEvent* events, std::size_t capac
   } else if (timeout_ns > 0) {
     changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns), come);
   }
-  if (interrupted_) {
-    interrupted_ = false;
-    return 0;
-  }
+  interrupted_ = false;
   const std::size_t count = std::min(size_, capacity);
   for (std::size_t i = 0; i < count; ++i) {
     events[i] = edges_[first_];

@@ -45,6 +45,11 @@ class Controller {
            flag_checks_.areWatched();
   }
 
+  /// Clock time for which it needs EdgesTaken; pulse::kNever: for none.
+  pulse::Nanoseconds edgesDue() const {
+    return std::min(requests_.latches.edgesDue(), flag_checks_.edgesDue());
+  }
+
   std::shared_ptr<const MachineSnapshot> snapshot() const;
 
   /// A failure of any axis's line, in words.
@@ -57,6 +62,7 @@ class Controller {
   void on(const EngineHangs& hang);
   void on(const InputRead& read) { context_.levels.update(read.input, read.level); }
   void on(const InputEdge& edge) { context_.levels.add(edge.edge); }
+  void on(const EdgesTaken& taken) { context_.levels.edgesAddedUntil(taken.until); }
   void on(const activity::PinDone& done) { context_.pin_done = done; }
   void on(const bus::RegisterDone& done);
   void on(const TimerDue& /*due*/) {}

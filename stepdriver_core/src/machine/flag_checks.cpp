@@ -44,11 +44,12 @@ std::string distanceText(const axis::AxisModel& axis, double distance) {
 }  // namespace
 
 FlagChecks::Check::Check(axis::AxisModel& checked, std::string its_flag,
-                         activity::InputEdges its_edges, pulse::Nanoseconds debounce)
+                         activity::InputEdges its_edges, pulse::Nanoseconds its_debounce)
     : axis(&checked),
       flag(std::move(its_flag)),
       edges(its_edges),
-      delay(debounce + activity::InputEdges::kLongestReport + kFlagLookPeriod) {}
+      debounce(its_debounce),
+      delay(its_debounce + activity::InputEdges::kLongestReport + kFlagLookPeriod) {}
 
 FlagChecks::FlagChecks(const std::vector<std::unique_ptr<axis::AxisModel>>& axes) {
   for (const auto& axis : axes) {
@@ -87,6 +88,7 @@ void FlagChecks::turnOn(const activity::Context& context, Check& check) {
   check.is_on = true;
   check.microsteps = check.axis->motor.microsteps();
   check.expected = {};
+  check.edges_due = pulse::kNever;
   check.began = check.looked = check.watched_until = context.now;
 }
 
@@ -100,9 +102,14 @@ void FlagChecks::look(const activity::Context& context, Check& check,
   for (const activity::InputEdges::Edge& edge : check.edges.poll(context)) {
     judge(context, edge, check, findings);
   }
-  if (context.now < check.looked + kFlagLookPeriod || context.now > check.watched_until) return;
-  check.looked = context.now;
-  lookForMissing(context, check, findings);
+  const bool is_watched = context.now <= check.watched_until;
+  if (is_watched && context.now >= check.looked + kFlagLookPeriod) {
+    check.looked = context.now;
+    lookForMissing(context, check, findings);
+  }
+  const pulse::Nanoseconds needed = check.looked + kFlagLookPeriod - check.delay + check.debounce;
+  const bool must_know = is_watched && context.levels.edgesAddedUntil() < needed;
+  check.edges_due = std::min(must_know ? needed : pulse::kNever, check.edges.edgesDue());
 }
 
 // Next to a reversal it can't be said at which side of the flag an edge is, and of an edge that the
@@ -137,6 +144,8 @@ void FlagChecks::lookForMissing(const activity::Context& context, Check& check,
   const double tolerance = axis.config.homing->flag_tolerance;
   const pulse::Nanoseconds time = context.now - check.delay;
   if (time < check.began) return;
+  // An edge before that time may still have to be handed over.
+  if (context.levels.edgesAddedUntil() < time + check.debounce) return;
   // It has changed, and what it has changed to isn't known yet.
   const auto changing = check.edges.changingSince();
   if (changing && context.now - *changing <= check.delay) return;
@@ -171,9 +180,18 @@ pulse::Nanoseconds FlagChecks::due() const {
   return due;
 }
 
+pulse::Nanoseconds FlagChecks::edgesDue() const {
+  pulse::Nanoseconds due = pulse::kNever;
+  for (const Check& check : checks_) {
+    if (check.is_on) due = std::min(due, check.edges_due);
+  }
+  return due;
+}
+
 bool FlagChecks::areWatched() const {
   return std::any_of(checks_.begin(), checks_.end(), [](const Check& check) {
-    return check.is_on && (check.axis->moving() || check.edges.due() != pulse::kNever);
+    return check.is_on && (check.axis->moving() || check.edges_due != pulse::kNever ||
+                           check.edges.changingSince());
   });
 }
 

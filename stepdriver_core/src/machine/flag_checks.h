@@ -34,6 +34,8 @@ class FlagChecks {
                             const std::function<bool(const axis::AxisModel&)>& is_homing);
   /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const;
+  /// Clock time until which all reported edges must be known; pulse::kNever: none is waited for.
+  pulse::Nanoseconds edgesDue() const;
   /// Whether it uses the levels of inputs now.
   bool areWatched() const;
 
@@ -45,6 +47,7 @@ class FlagChecks {
     axis::AxisModel* axis;
     std::string flag;
     activity::InputEdges edges;
+    pulse::Nanoseconds debounce;
     pulse::Nanoseconds delay;  ///< an edge is known so long after its time, if there was one
     bool is_on = false;
     int microsteps = 0;  ///< the mode in which it was turned on
@@ -53,6 +56,7 @@ class FlagChecks {
     std::array<bool, 4> expected{};
     std::array<pulse::Nanoseconds, 4> seen{};  ///< the last edge
     pulse::Nanoseconds looked = 0;
+    pulse::Nanoseconds edges_due = pulse::kNever;  ///< for the next look
     pulse::Nanoseconds watched_until = 0;
   };
 

@@ -35,6 +35,10 @@ struct InputRead {
 struct InputEdge {
   gpio::EdgeEvent edge;
 };
+/// All edges that the lines had reported by a time were handed over.
+struct EdgesTaken {
+  pulse::Nanoseconds until = 0;  ///< clock time
+};
 /// The pulse engine waits for a line whose chip doesn't answer. Until it does, nothing moves and
 /// nothing that moved has an end.
 struct EngineHangs {
@@ -48,8 +52,8 @@ struct Input {
   pulse::Nanoseconds now = 0;      ///< clock time
   pulse::Nanoseconds slipped = 0;  ///< motion time is clock time minus this
   std::uint64_t stops_asked = 0;   ///< emergency stops that were requested
-  std::variant<Requested, EngineNews, EngineHangs, InputRead, InputEdge, activity::PinDone,
-               bus::RegisterDone, TimerDue>
+  std::variant<Requested, EngineNews, EngineHangs, InputRead, InputEdge, EdgesTaken,
+               activity::PinDone, bus::RegisterDone, TimerDue>
       what;
 };
 

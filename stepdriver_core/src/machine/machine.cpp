@@ -196,10 +196,11 @@ class Machine::Impl {
     for (const AxisId id : stroke.line.axes) names.push_back(axes_[id]->config().name);
     const auto record = stroke.latch ? stroke.latch->record : nullptr;
     ProbeStrokeResult ended;
+    const auto begin = stroke.begin;
     if (!stroke.is_first) awaitResume(cancelled);
     const CoordinatedMove line = moveOf(names, ask(*shell_, std::move(stroke)));
+    ended.begin = *begin;
     for (const CoordinatedMove::Member& member : line.members) {
-      ended.begin.push_back(machine.axis(member.axis).state().position);
       ended.targets.push_back(member.move.target);
     }
     const auto is_over = [&] { return result(line) && (!record || record->result()); };

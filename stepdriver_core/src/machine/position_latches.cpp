@@ -27,7 +27,7 @@ void PositionLatches::begin(const activity::Context& context, Subject subject,
     throw Refused(fmt::format("{} latches wait for edges already, the most at once", kMostOpen));
   }
   forEachWatched(subject, [](axis::AxisModel& axis) { axis.motor.watchMotions(); });
-  open_.push_back({std::move(subject), edges, {}, false});
+  open_.push_back({std::move(subject), edges, {}, false, {}});
   open_.back().edges.begin(context);
 }
 
@@ -76,7 +76,10 @@ std::string PositionLatches::look(const activity::Context& context, Open& open) 
     conclude(open, why);
     return why;
   }
-  if (motion && !moves && open.edges.due() == pulse::kNever) {
+  // A contact at the end of the motion may still have to be told of.
+  if (motion && !moves && !open.motion_ended) open.motion_ended = context.now;
+  if (open.motion_ended && !open.edges.changingSince() &&
+      context.levels.edgesAddedUntil() >= *open.motion_ended) {
     open.over = true;
     conclude(open, "the motion has ended before a contact");
   }
@@ -111,6 +114,14 @@ void PositionLatches::conclude(Open& open, const std::string& message) {
   forEachWatched(open.subject, [](axis::AxisModel& axis) { axis.motor.unwatchMotions(); });
   open.result.message = message;
   open.subject.record->end(open.result);
+}
+
+pulse::Nanoseconds PositionLatches::edgesDue() const {
+  pulse::Nanoseconds due = pulse::kNever;
+  for (const Open& open : open_) {
+    due = std::min({due, open.edges.edgesDue(), open.motion_ended.value_or(pulse::kNever)});
+  }
+  return due;
 }
 
 pulse::Nanoseconds PositionLatches::due() const {

@@ -50,6 +50,8 @@ class PositionLatches {
   std::vector<Ending> poll(const activity::Context& context);
   /// Clock time by which poll() must be called.
   pulse::Nanoseconds due() const;
+  /// Clock time until which all reported edges must be known; pulse::kNever: none is waited for.
+  pulse::Nanoseconds edgesDue() const;
   /// Whether one of them uses the levels of inputs.
   bool areWatched() const { return !open_.empty(); }
 
@@ -59,6 +61,7 @@ class PositionLatches {
     activity::InputEdges edges;
     LatchResult result;
     bool over = false;
+    std::optional<pulse::Nanoseconds> motion_ended;  ///< clock time by which its motion had ended
   };
   /// @return why the axes must come to rest now; empty: they needn't.
   static std::string look(const activity::Context& context, Open& open);

@@ -17,6 +17,8 @@ namespace stepdriver::machine {
 namespace {
 
 constexpr std::int64_t kInputPeriodNs = 100'000'000;
+// The same while somebody waits for a missing edge, or may have to.
+constexpr std::int64_t kEdgePeriodNs = 5'000'000;
 constexpr pulse::Nanoseconds kOften = 1'000'000;
 constexpr pulse::Nanoseconds kVirtualInputPeriod = 1'000'000;
 // The pulse thread hangs if it makes no progress in a pass from one of so many looks to the next.
@@ -187,7 +189,7 @@ bool Shell::pump(const std::function<bool()>& ready, const Patience& patience) {
     if (ready()) return true;
     if (changes != changes_) continue;  // it has made a request itself
     if (clock_.now() >= end) return false;
-    const pulse::Nanoseconds due = std::min({engine_due_, core_.due(), end});
+    const pulse::Nanoseconds due = std::min({engine_due_, core_.due(), core_.edgesDue(), end});
     if (due == pulse::kNever) throw Error("nothing is under way that could end this wait");
     const pulse::Nanoseconds next_look = patience.often ? clock_.now() + kOften : pulse::kNever;
     clock_.waitUntil(std::min({due, core_.dueWithPolls(), next_look, next_reading}));
@@ -212,7 +214,7 @@ void Shell::advance(pulse::Nanoseconds time) {
   const pulse::Nanoseconds end = clock_.now() + time;
   for (;;) {
     settle();
-    const pulse::Nanoseconds due = std::min(engine_due_, core_.dueWithPolls());
+    const pulse::Nanoseconds due = std::min({engine_due_, core_.dueWithPolls(), core_.edgesDue()});
     if (due > end && clock_.now() >= end) return;
     clock_.waitUntil(std::min(due, end));
   }
@@ -259,11 +261,17 @@ bool Shell::responds(std::chrono::nanoseconds longest) {
 // that came while a chip was waking up.
 void Shell::watchInputs() {
   pthread_setname_np(pthread_self(), "inputs");
+  std::int64_t read_at = steadyNow();
   while (!ending_) {
     std::array<gpio::EdgeEvent, 16> edges{};
-    const int count = lines_->waitForEdges(kInputPeriodNs, edges.data(), edges.size());
+    const pulse::Nanoseconds asked = clock_.now();
+    const std::int64_t period = core_.watchesInputs() ? kEdgePeriodNs : kInputPeriodNs;
+    const int count = lines_->waitForEdges(period, edges.data(), edges.size());
+    const bool must_read = steadyNow() >= read_at + kInputPeriodNs || asked >= core_.edgesDue();
+    if (count == 0 && !must_read) continue;
+    read_at = steadyNow();
     engine_.inputsChanged();
-    if (core_.watchInputs(edges.data(), count)) wake_.raise();
+    if (core_.watchInputs(edges.data(), count, asked)) wake_.raise();
     // If waiting fails, reading will fail too, and report it.
     if (count < 0) std::this_thread::sleep_for(std::chrono::nanoseconds(kInputPeriodNs));
   }
@@ -349,7 +357,8 @@ void Shell::watchPulses() {
 pulse::Nanoseconds Shell::alarm() const {
   const bool time_passes =
       clock_.passesByItself() || core_.due() != pulse::kNever || mustWatchPulses();
-  const pulse::Nanoseconds due = time_passes ? core_.dueWithPolls() : core_.due();
+  const pulse::Nanoseconds due =
+      std::min(time_passes ? core_.dueWithPolls() : core_.due(), core_.edgesDue());
   return core_.watchesInputs() ? std::min(due, clock_.now() + kVirtualInputPeriod) : due;
 }
 
@@ -377,8 +386,9 @@ bool Shell::feedInputs() {
   if (!has_inputs_) return false;
   std::array<gpio::EdgeEvent, 16> edges{};
   for (int count = 1; count > 0;) {
+    const pulse::Nanoseconds asked = clock_.now();
     count = lines_->waitForEdges(0, edges.data(), edges.size());
-    core_.watchInputs(edges.data(), count);
+    core_.watchInputs(edges.data(), count, asked);
   }
   bool fed = false;
   while (core_.takeInput()) fed = true;

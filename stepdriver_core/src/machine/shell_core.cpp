@@ -26,7 +26,7 @@ ShellCore::ShellCore(Controller& controller, pulse::PulseEngine& engine, pulse::
       due_(controller.due()),
       poll_due_(controller.pollDue()),
       watches_(controller.watchesInputs()) {
-  watchInputs(nullptr, 0);
+  watchInputs(nullptr, 0, clock.now());
 }
 
 // ---- any thread ----
@@ -42,13 +42,17 @@ std::string ShellCore::post(activity::CallId call, Request request) {
   return {};
 }
 
-bool ShellCore::watchInputs(const gpio::EdgeEvent* edges, int count) {
+bool ShellCore::watchInputs(const gpio::EdgeEvent* edges, int count, pulse::Nanoseconds asked) {
   for (int i = 0; i < count; ++i)
     engine_.noteEdge(edges[i].input, edges[i].level, edges[i].time_ns);
   const InputReading reading = readInputs();
   const std::lock_guard<std::mutex> lock(mutex_);
   for (int i = 0; i < count; ++i) seen_.emplace_back(InputEdge{edges[i]});
-  return queue(reading) || count > 0;
+  const bool changed = queue(reading) || count > 0;
+  // If nothing was left to report, everything that was reported before the call is known.
+  if (count > 0 || asked < edges_due_) return changed;
+  seen_.emplace_back(EdgesTaken{asked});
+  return true;
 }
 
 std::vector<activity::CallId> ShellCore::close() {
@@ -142,6 +146,7 @@ void ShellCore::handle(decltype(Input::what) what) {
   due_ = controller_.due();
   poll_due_ = controller_.pollDue();
   watches_ = controller_.watchesInputs();
+  edges_due_ = controller_.edgesDue();
   const std::shared_ptr<const MachineSnapshot> before =
       std::exchange(snapshot_, controller_.snapshot());
   if (recorder_ != nullptr) recorder_->addTurn(input, out, *before, *snapshot_);

@@ -63,8 +63,11 @@ class ShellCore {
 
   /// Hands over edges of the inputs, and their present levels.
   /// @param count as Lines::waitForEdges() has returned it; not above 0: there are no edges.
+  /// @param asked clock time at which that was called
   /// @return whether there is anything of which the controller must be told.
-  bool watchInputs(const gpio::EdgeEvent* edges, int count);
+  bool watchInputs(const gpio::EdgeEvent* edges, int count, pulse::Nanoseconds asked);
+  /// When watchInputs() must be called, also without edges; pulse::kNever: it needn't be.
+  pulse::Nanoseconds edgesDue() const { return edges_due_.load(); }
 
   /// Refuses what is posted from now on.
   /// @return the calls that haven't been handled.
@@ -122,6 +125,7 @@ class ShellCore {
   std::atomic<bool> news_{true};
   std::atomic<std::uint64_t> readings_{0};  // how many have begun
   std::atomic<std::uint64_t> turns_begun_{0};
+  std::atomic<pulse::Nanoseconds> edges_due_{pulse::kNever};
 
   mutable std::mutex mutex_;  // guards the next four
   std::deque<Item> requests_;
@@ -137,7 +141,7 @@ class ShellCore {
   std::shared_ptr<const MachineSnapshot> snapshot_;
   pulse::Nanoseconds due_;
   pulse::Nanoseconds poll_due_;
-  bool watches_;
+  std::atomic<bool> watches_;
 };
 
 }  // namespace stepdriver::machine

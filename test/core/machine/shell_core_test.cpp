@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -14,12 +16,13 @@
 #include "machine/wiring.h"
 #include "stepdriver_core/gpio/simulated_lines.h"
 #include "support/bench.h"
+#include "support/homing_kinds_bench.h"
 
 namespace stepdriver::machine {
 namespace {
 
-/// One axis on the rig. Each event is handled when the test says so; slow lines are written at
-/// once.
+/// One axis on the rig, and an input that it presses from 1 to 1.5 mm. Each event is handled when
+/// the test says so; slow lines are written at once.
 class ByHand : public ShellCore::Host, public pulse::NewsListener {
  public:
   ByHand() {
@@ -55,6 +58,42 @@ class ByHand : public ShellCore::Host, public pulse::NewsListener {
     }
     return answers_.at(call);
   }
+  /// Time passes, in which nobody takes the edges of the inputs.
+  void passUnwatched(pulse::Nanoseconds time) {
+    const pulse::Nanoseconds end = clock_.now() + time;
+    for (settle(); clock_.now() < end; settle()) {
+      clock_.waitUntil(std::min({core_.due(), engine_due_, end}));
+    }
+  }
+  /// The thread that watches the inputs has its turn, until no edge is left.
+  /// @param loses the edges that were reported are lost
+  void watch(bool loses = false) {
+    std::array<gpio::EdgeEvent, 16> edges{};
+    if (loses) {
+      EXPECT_GT(lines_->waitForEdges(0, edges.data(), edges.size()), 0);
+    }
+    for (int count = 1; count > 0;) {
+      const pulse::Nanoseconds asked = clock_.now();
+      count = lines_->waitForEdges(0, edges.data(), edges.size());
+      core_.watchInputs(edges.data(), count, asked);
+    }
+    while (core_.takeInput()) {
+    }
+    settle();
+  }
+  BeginLatch latch(LatchEdge edge, bool every) {
+    BeginLatch latch;
+    latch.id = 1;
+    latch.wanted.input = "flag";
+    latch.wanted.edge = edge;
+    latch.wanted.every = every;
+    latch.axes = {0};
+    latch.record = std::make_shared<LatchRecord>();
+    return latch;
+  }
+  std::vector<std::int64_t> flagTimes(bool level) const {
+    return trace_->times("x", "flag1", level);
+  }
   const activity::Reply& answer(activity::CallId call) const { return answers_.at(call); }
   /// The engine says that the motion has ended, and nothing about a fault.
   void endMotion(pulse::EndReason end) {
@@ -86,14 +125,33 @@ class ByHand : public ShellCore::Host, public pulse::NewsListener {
     return names;
   }
 
+  static MachineOptions withFlag() {
+    MachineOptions options;
+    options.inputs = {test::inputNamed("flag")};
+    return options;
+  }
+  static sim::RigAxisSpec passingFlag(const config::AxisConfig& config) {
+    sim::RigAxisSpec spec = test::rigAxis(config);
+    spec.flags = {test::flagOf("flag", 1.0, 1.5)};
+    return spec;
+  }
+
   const std::vector<config::AxisConfig> configs_{test::linearAxis("x")};
+  const MachineOptions options_ = withFlag();
   pulse::VirtualClock clock_;
-  sim::Rig rig_{{test::rigAxis(configs_[0])}};
+  std::shared_ptr<sim::MemoryTrace> trace_ = std::make_shared<sim::MemoryTrace>();
+  sim::Rig rig_{{passingFlag(configs_[0])}, trace_, {}, {}, test::Bench::ioOf(options_)};
   gpio::SimulatedBackend backend_{rig_, [this] { return clock_.now(); }};
-  const Wiring wiring_{configs_, MachineOptions()};
+  const Wiring wiring_{configs_, options_};
   std::shared_ptr<gpio::Lines> lines_{backend_.request(wiring_.outputs, wiring_.inputs)};
   pulse::PulseEngine engine_{*lines_, clock_, wiring_.channels, 5'000'000};
-  Controller controller_{configs_, wiring_.motor_lines, names(), {}, EmergencyDisable::kHold};
+  Controller controller_{configs_,
+                         wiring_.motor_lines,
+                         names(),
+                         {},
+                         EmergencyDisable::kHold,
+                         wiring_.motorPower(options_),
+                         wiring_.namedLines(options_)};
   ShellCore core_{controller_, engine_, clock_, lines_, wiring_.inputs.size(), *this, nullptr};
   pulse::Nanoseconds engine_due_ = 0;
   activity::CallId calls_ = 0;
@@ -157,6 +215,72 @@ TEST(ShellCore, SaysThatTheEngineHangsWhereverItDoes) {
                                    : "the ENABLE line x.enable";
     EXPECT_NE(fault.find(wanted), std::string::npos) << fault;
   }
+}
+
+// ---- edges that are taken late ----
+
+// The levels that come with requests tell of the change long before the edges.
+TEST(ShellCore, WaitsForEdgesThatNobodyHasTakenHoweverLongThatTakes) {
+  ByHand machine;
+  const BeginLatch latch = machine.latch(LatchEdge::kEither, true);
+  EXPECT_FALSE(machine.answerOf(latch).failure);
+  EXPECT_FALSE(machine.answerOf(MoveTo{0, 0.0012, false, 0.0}).failure);
+  for (int i = 0; i < 50; ++i) {
+    machine.passUnwatched(10'000'000);
+    EXPECT_FALSE(machine.answerOf(SetSpeedOverride{1.0}).failure);
+  }
+  // It has been on, off, and on again.
+  EXPECT_FALSE(machine.answerOf(MoveTo{0, 0.002, false, 0.0}).failure);
+  machine.passUnwatched(500'000'000);
+  EXPECT_FALSE(machine.answerOf(MoveTo{0, 0.0012, false, 0.0}).failure);
+  machine.passUnwatched(500'000'000);
+  EXPECT_TRUE(latch.record->take().empty());
+  machine.watch();
+  const std::vector<LatchedEdge> edges = latch.record->take();
+  ASSERT_EQ(edges.size(), 3U);
+  const std::vector<std::int64_t> rises = machine.flagTimes(true);
+  EXPECT_EQ(edges[0].time, rises.at(0));
+  EXPECT_EQ(edges[1].time, machine.flagTimes(false).at(0));
+  EXPECT_EQ(edges[2].time, rises.at(1));
+  for (const LatchedEdge& edge : edges) EXPECT_FALSE(edge.was_read) << edge.number;
+}
+
+TEST(ShellCore, SaysOfAnEdgeThatWasLostThatItWasRead) {
+  ByHand machine;
+  const BeginLatch latch = machine.latch(LatchEdge::kEither, true);
+  EXPECT_FALSE(machine.answerOf(latch).failure);
+  EXPECT_FALSE(machine.answerOf(MoveTo{0, 0.0012, false, 0.0}).failure);
+  machine.passUnwatched(500'000'000);
+  machine.watch(true);
+  EXPECT_TRUE(latch.record->take().empty()) << "its edge may still be reported";
+  EXPECT_NE(machine.core().edgesDue(), pulse::kNever);
+  machine.passUnwatched(10'000'000);
+  machine.watch();
+  const std::vector<LatchedEdge> edges = latch.record->take();
+  ASSERT_EQ(edges.size(), 1U);
+  EXPECT_TRUE(edges[0].was_read);
+  EXPECT_EQ(machine.core().edgesDue(), pulse::kNever);
+}
+
+// The axis has come to rest at its target before anybody has taken the edge of its last step.
+TEST(ShellCore, FindsAContactWhoseEdgeIsTakenAfterTheEndOfItsMotion) {
+  ByHand machine;
+  ProbeStroke stroke;
+  stroke.line.axes = {0};
+  stroke.line.positions = {0.001};
+  stroke.latch = machine.latch(LatchEdge::kActive, false);
+  stroke.stops = {machine.core().snapshot()->axes.at(0).stopsOtherThanHolds()};
+  const auto record = stroke.latch->record;
+  const auto begin = stroke.begin;
+  EXPECT_FALSE(machine.answerOf(stroke).failure);
+  EXPECT_EQ(*begin, std::vector<double>{0.0});
+  machine.passUnwatched(1'000'000'000);
+  EXPECT_FALSE(machine.core().snapshot()->axes.front().state.moving);
+  EXPECT_FALSE(record->result()) << record->result()->message;
+  machine.watch();
+  ASSERT_TRUE(record->result());
+  ASSERT_TRUE(record->result()->latched) << record->result()->message;
+  EXPECT_EQ(record->result()->edge->time, machine.flagTimes(true).front());
 }
 
 }  // namespace

@@ -688,6 +688,7 @@ bool Participants::canGo(Who who) {
                                 }));
     case Who::kWatcher: {
       if (watch_due_ != pulse::kNever) return clock_.now() >= watch_due_;
+      if (clock_.now() >= core_->edgesDue()) return true;
       return readInputs() != watched_;
     }
     case Who::kClientA:
@@ -862,6 +863,7 @@ void Participants::writeLines() {
 
 void Participants::watch() {
   std::array<gpio::EdgeEvent, 16> events{};
+  const pulse::Nanoseconds asked = clock_.now();
   const int count = lines_->waitForEdges(0, events.data(), events.size());
   if (loses_edges_) {
     loses_edges_ = false;
@@ -872,7 +874,7 @@ void Participants::watch() {
   engine_->inputsChanged();
   engine_reads_inputs_ = true;
   watched_ = readInputs();
-  core_->watchInputs(events.data(), count);
+  core_->watchInputs(events.data(), count, asked);
 }
 
 bool Participants::engineIsDue() { return clock_.woken || clock_.now() >= engine_due_; }
@@ -902,6 +904,7 @@ pulse::Nanoseconds Participants::nextDue() {
   look(core_->dueWithPolls());
   if (!accesses_.empty()) look(accesses_.front().due);
   look(watch_due_);
+  look(core_->edgesDue());
   for (const Client& client : clients_) {
     if (client.next || hasTurn(client)) look(client.from);
   }

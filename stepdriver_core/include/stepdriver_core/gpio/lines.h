@@ -97,8 +97,8 @@ class Lines {
   ///
   /// @param timeout_ns on CLOCK_MONOTONIC, on simulated lines too; negative: no timeout.
   /// @param capacity of `events`, above 0. The next call reports the edges that don't fit.
-  /// @return the number of events; 0 after the timeout, an interrupt() or a signal; or -errno,
-  ///   which is reported once if a chip was removed.
+  /// @return the number of events; 0 after the timeout, an interrupt() or a signal, if nothing is
+  ///   left to report; or -errno, which is reported once if a chip was removed.
   [[nodiscard]] virtual int waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
                                          std::size_t capacity) noexcept = 0;
 

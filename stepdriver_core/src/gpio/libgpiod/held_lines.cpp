@@ -114,7 +114,6 @@ int HeldLines::waitForEdges(std::int64_t timeout_ns, EdgeEvent* events,
   if (polled_[0].revents != 0) {
     eventfd_t interrupts = 0;
     eventfd_read(interrupt_fd_, &interrupts);
-    return 0;
   }
   std::size_t count = 0;
   for (std::size_t i = 0; i < sources_.size() && count < capacity; ++i) {

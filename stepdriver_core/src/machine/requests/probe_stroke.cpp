@@ -16,6 +16,8 @@ std::string ProbeStroke::text(const AxisWords& words) const {
 void ProbeStroke::serve(RequestContext& machine, const SharedCall& call) const {
   refuseUnlessUndisturbed(machine);
   if (latch) refuseUnlessApart(machine);
+  begin->clear();
+  for (const AxisId id : line.axes) begin->push_back(machine.axis(id).positionNow());
   const auto outcome = line.begin(machine, call);
   if (latch) latch->begin(machine, outcome);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,8 @@ struct ProbeStroke {
   /// AxisSnapshot::stopsOtherThanHolds() of each axis when the probing began: whatever stops one of
   /// them ends it.
   std::vector<std::uint64_t> stops;
+  /// [unit] Where each axis stood when it began; serve() writes it before the answer.
+  std::shared_ptr<std::vector<double>> begin = std::make_shared<std::vector<double>>();
 
   static constexpr bool kReadsInputs = true;
   std::string text(const AxisWords& words) const;
