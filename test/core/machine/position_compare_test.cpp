@@ -433,6 +433,30 @@ TEST_F(PositionCompareTest, AtTheEndOfAMotionButNotOfAHoldOrAStop) {
   EXPECT_EQ(switchedOn().size(), 1U);
 }
 
+// An axis that turns without end is at a place of its positions, and not at the same angle of each
+// turn.
+TEST_F(PositionCompareTest, ARotaryAxisHasItsPlacesInRad) {
+  axes[0].kind = config::Kind::kRotary;
+  axes[0].steps_per_unit = 1000.0;
+  axes[0].max_speed = 3.0;
+  axes[0].acceleration = axes[0].deceleration = 30.0;
+  axes[0].start_speed = 0.0;
+  axes[0].min_position.reset();
+  axes[0].max_position.reset();
+  axes[0].continuous = true;
+  begin();
+  EXPECT_REFUSED(machine().setPositionCompare("camera", at({kNan})), "has a place at nan rad");
+  machine().setPositionCompare("camera", at({1.0, 9.0}));
+  machine().setPositionCompare("valve", cam(2.0, 2.0 + 2.0 * test::kPi));
+  move(10.0);
+  move(0.0);
+  expectTimes(switchedOn(), timesAt(arrivals(), {1'000, 9'000}));
+  EXPECT_EQ(switchedOn().size(), 4U);
+  EXPECT_EQ(edges(1).size(), 4U);
+  expectTimes(switchedOn(1),
+              {timesAt(arrivals(), {2'000}, 1).at(0), timesAt(arrivals(), {8'283}, -1).at(0)});
+}
+
 TEST_F(PositionCompareTest, AStopSaysWhatItHasCutOff) {
   machine().setPositionCompare("camera", every(0.002, 0.01, 0.09, 1e-3));
   machine().setPositionCompare("valve", cam(0.08, 0.085));
