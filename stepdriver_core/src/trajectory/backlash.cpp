@@ -132,8 +132,17 @@ double slackAfter(const Profile& motor, double slack, std::int64_t backlash) {
 // The motions that take up the backlash, one reversal after the other.
 class TakeUps {
  public:
-  TakeUps(double slack, std::int64_t backlash, const MotionLimits& limits, PeaksBetween joint)
-      : backlash_(backlash), limits_(limits), joint_(std::move(joint)), last_(0, slack) {}
+  // `slack` is what the motor's motion has added to the joint's, `taken` what it has taken up.
+  TakeUps(double slack, double taken, std::int64_t backlash, const MotionLimits& limits,
+          PeaksBetween joint)
+      : backlash_(backlash),
+        limits_(limits),
+        joint_(std::move(joint)),
+        taken_(taken),
+        last_(0, slack),
+        was_cut_(std::abs(taken - slack) >= kNoTravel) {
+    if (was_cut_) asked_ = std::llround(slack);
+  }
 
   std::int64_t wanted(const Turn& turn) const { return turn.sign > 0.0 ? backlash_ : 0; }
   MotionState stateAt(const Turn& turn) const { return last_.stateAt(nanoseconds(turn.time_s)); }
@@ -165,68 +174,77 @@ class TakeUps {
   }
   std::optional<double> noRoom() const { return no_room_; }
 
-  /// Whether a reversal came before the motion for the previous one had ended: then the joint may
-  /// not have followed, and settle() knows.
-  bool wasCut() const { return was_cut_; }
-  /// The motion after a motor's motion that came to rest a time [s] after its start: the joint,
-  /// which is beyond its end by less than the backlash, is brought there from the other side. Empty
-  /// if it is there. @param slack the part that is taken up in fact, see slackAfter()
-  std::optional<Profile> settle(double slack, double time_s) {
-    if (!asked_ || std::abs(slack - static_cast<double>(*asked_)) < kNoTravel) return {};
-    const Turn back{time_s, *asked_ > 0 ? -1.0 : 1.0};
-    return at(back, nullptr);
+  /// Whether the joint isn't where it should be after a motor's motion, though what was added has
+  /// come to rest: a reversal came before the motion for the previous one had ended. The motion is
+  /// asked for only if there was one.
+  template <typename Motor>
+  bool isJointBehind(const Motor& motor) const {
+    if (!was_cut_ || !asked_) return false;
+    const double taken = slackAfter(motor(), taken_, backlash_);
+    return std::abs(taken - static_cast<double>(*asked_)) >= kNoTravel;
+  }
+  /// The motion after that, which begins at rest [s]: the joint, which is beyond its end by less
+  /// than the backlash, is brought there from the other side.
+  std::optional<Profile> settle(double time_s) {
+    return at(Turn{time_s, *asked_ > 0 ? -1.0 : 1.0}, nullptr);
   }
 
  private:
   std::int64_t backlash_;
   MotionLimits limits_;
   PeaksBetween joint_;
+  double taken_;  // at the start
   Profile last_;
   std::optional<double> no_room_;
   std::optional<std::int64_t> asked_;  // by the latest reversal
-  bool was_cut_ = false;
+  bool was_cut_;
 };
 
-// The backlash rests before the start, too.
-void append(std::vector<Piece>& pieces, DoubleDouble& time, const Profile& taken) {
-  const DoubleDouble start = secondsOf(taken.startNs());
-  if (const DoubleDouble rest = start - time; rest.hi > kNegligibleTime) {
-    pieces.push_back({rest, taken.startPosition()});
-  }
-  for (const Piece& piece : taken.pieces()) pieces.push_back(piece);
-  time = start + taken.duration();
-}
+// What is added to the joint's motion: motions that take up the backlash, which rests before each.
+class AddedMotion {
+ public:
+  explicit AddedMotion(double slack) : slack_(slack) {}
 
-// The joint's motion plus that of the backlash, which ends with the joint at its end.
-Profile motorOf(const Profile& joint, double slack, std::int64_t backlash, TakeUps& take_ups,
-                std::vector<Piece> pieces, DoubleDouble time) {
-  const auto both = [&] {
-    return sum(joint, pieces.empty() ? Profile(0, slack) : Profile(0, pieces));
-  };
-  Profile motor = both();
-  if (!take_ups.wasCut() || take_ups.noRoom()) return motor;
-  const double rest = std::max(joint.duration(), time).value() + kRestedFor;
-  const auto settled = take_ups.settle(slackAfter(motor, slack, backlash), rest);
-  if (!settled) return motor;
-  append(pieces, time, *settled);
-  return both();
+  void add(const Profile& taken) {
+    const DoubleDouble start = secondsOf(taken.startNs());
+    if (const DoubleDouble rest = start - end_; rest.hi > kNegligibleTime) {
+      pieces_.push_back({rest, taken.startPosition()});
+    }
+    for (const Piece& piece : taken.pieces()) pieces_.push_back(piece);
+    end_ = start + taken.duration();
+  }
+  DoubleDouble end() const { return end_; }
+  Profile profile() const { return pieces_.empty() ? Profile(0, slack_) : Profile(0, pieces_); }
+
+ private:
+  double slack_;
+  std::vector<Piece> pieces_;
+  DoubleDouble end_;
+};
+
+// The joint's motion plus what is added, which ends with the joint at its end.
+Profile motorOf(const Profile& joint, TakeUps& take_ups, AddedMotion added) {
+  Profile motor = sum(joint, added.profile());
+  if (take_ups.noRoom() || !take_ups.isJointBehind([&] { return motor; })) return motor;
+  const double rest = std::max(joint.duration(), added.end()).value() + kRestedFor;
+  if (const auto settled = take_ups.settle(rest)) added.add(*settled);
+  return sum(joint, added.profile());
 }
 
 }  // namespace
 
 MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
-                    const MotionLimits& limits) {
+                    const MotionLimits& limits, std::optional<double> taken) {
   const PeakTree peaks(joint);
-  TakeUps take_ups(slack, backlash, limits,
+  TakeUps take_ups(slack, taken.value_or(slack), backlash, limits,
                    [&](DoubleDouble from, DoubleDouble to) { return peaks.between(from, to); });
   const std::vector<Turn> turns = turnsOf(joint);
-  std::vector<Piece> pieces;
-  DoubleDouble time;
+  AddedMotion added(slack);
   for (std::size_t i = 0; i < turns.size() && !take_ups.noRoom(); ++i) {
     const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
-    if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
+    if (const auto motion = take_ups.at(turns[i], next)) added.add(*motion);
   }
-  Profile motor = motorOf(joint, slack, backlash, take_ups, std::move(pieces), time);
+  Profile motor = motorOf(joint, take_ups, std::move(added));
   if (take_ups.noRoom()) return {joint, take_ups.noRoom()};
   return {std::move(motor), {}};
 }
@@ -258,18 +276,17 @@ MotorTail::MotorTail(const Profile& joint, std::int64_t backlash, const MotionLi
   plan->from_rest.assign(turns.size(), false);
   const bool up = !turns.empty() && turns.front().sign > 0.0;
   const double slack = up ? static_cast<double>(backlash) : 0.0;
-  TakeUps take_ups(slack, backlash, limits, [&plan](DoubleDouble from, DoubleDouble to) {
+  TakeUps take_ups(slack, slack, backlash, limits, [&plan](DoubleDouble from, DoubleDouble to) {
     return plan->peaks.between(from, to);
   });
-  std::vector<Piece> pieces;
-  DoubleDouble time;
+  AddedMotion added(slack);
   for (std::size_t i = 1; i < turns.size() && !take_ups.noRoom(); ++i) {
     giveWay(i);
     plan->from_rest[i] = take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i]);
     const Turn* next = i + 1 < turns.size() ? &turns[i + 1] : nullptr;
-    if (const auto taken = take_ups.at(turns[i], next)) append(pieces, time, *taken);
+    if (const auto taken = take_ups.at(turns[i], next)) added.add(*taken);
   }
-  motor_ = motorOf(joint, slack, backlash, take_ups, std::move(pieces), time);
+  motor_ = motorOf(joint, take_ups, std::move(added));
   no_room_ = take_ups.noRoom();
   plan_ = std::move(plan);
 }
@@ -360,7 +377,7 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
 
   const Profile of_head = part(*joint, 0.0, begin);
   const PeakTree head_peaks(of_head);
-  TakeUps take_ups(slack, backlash_, limits_, [&](DoubleDouble from, DoubleDouble to) {
+  TakeUps take_ups(slack, slack, backlash_, limits_, [&](DoubleDouble from, DoubleDouble to) {
     Highest highest;
     if (from < begin) highest = head_peaks.between(from, std::min(to, begin));
     if (!(begin < to)) return highest;
@@ -368,20 +385,19 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
   });
   MotorSections sections(joint, slack);
   JoinedMotor joined{Profile(0, 0.0), {{0.0, later}}, {}};
-  // Whether the joint is where the tail expects it, though a reversal came too soon before.
-  const auto follows = [&](const Turn& before, const Turn& turn) {
-    if (!take_ups.wasCut()) return true;
-    MotorSections until = sections;
-    until.rest(turn.time_s);
-    const double taken = slackAfter(Profile(0, until.release()), slack, backlash_);
-    return std::abs(taken - static_cast<double>(take_ups.wanted(before))) < kNoTravel;
+  // Whether the joint isn't where the tail expects it.
+  const auto is_behind = [&](const Turn& turn) {
+    return take_ups.isJointBehind([&] {
+      MotorSections until = sections;
+      until.rest(turn.time_s);
+      return Profile(0, until.release());
+    });
   };
   const Turn* tail_from = nullptr;
   for (std::size_t i = 0; i < turns.size(); ++i) {
     const std::size_t of_tail = i < known ? 0 : same_from + i - known;
     if (of_tail > 0 && plan_->from_rest[of_tail] &&
-        take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i]) &&
-        follows(turns[i - 1], turns[i])) {
+        take_ups.restsAt(take_ups.wanted(turns[i - 1]), turns[i]) && !is_behind(turns[i])) {
       tail_from = &turns[i];
       break;
     }
@@ -405,10 +421,10 @@ std::optional<JoinedMotor> MotorTail::join(const std::shared_ptr<const MotorTail
   } else {
     sections.rest(std::max(sections.time(), joint->duration()));
   }
-  if (tail_from == nullptr && take_ups.wasCut()) {
-    const Profile unsettled(0, sections.sections());
+  if (tail_from == nullptr &&
+      take_ups.isJointBehind([&] { return Profile(0, sections.sections()); })) {
     const double rest = sections.time().value() + kRestedFor;
-    if (const auto settled = take_ups.settle(slackAfter(unsettled, slack, backlash_), rest)) {
+    if (const auto settled = take_ups.settle(rest)) {
       sections.add(*settled);
       joined.fresh.push_back({rest, rest + settled->duration().value()});
     }

@@ -30,8 +30,11 @@ struct MotorPlan {
 /// @param slack [microsteps] the part of the backlash that is taken up at the start: from 0 to all.
 /// @param limits the motor's. The deceleration is ignored, because a motor that speeds up on one
 ///   side of the backlash slows down on the other.
+/// @param taken [microsteps] the part that is taken up in fact, if it isn't `slack`: the joint lags
+///   behind its motion, because the turns before the start were shorter than the backlash. It is
+///   brought to its end all the same.
 MotorPlan planMotor(const Profile& joint, double slack, std::int64_t backlash,
-                    const MotionLimits& limits);
+                    const MotionLimits& limits, std::optional<double> taken = {});
 
 /// The part of a backlash that is taken up at a time of a motor's motion [microsteps]. It is empty
 /// if the motion before that doesn't determine it: the motor turned so little, or so often.

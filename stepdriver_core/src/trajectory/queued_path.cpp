@@ -370,6 +370,7 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(
     const std::vector<TrajectoryPoint>& points, std::int64_t passed_ns,
     std::shared_ptr<const PathMarks> marks) const {
   const DoubleDouble passed = secondsOf(passed_ns);
+  const std::int64_t origin_ns = splitNanoseconds(motion_->origin()).whole;
   std::vector<TrajectoryPath::Member> members = motion_->members();
   const bool smooth = hasJerkLimit(window_->axes);
   for (std::size_t k = 0; k < members.size(); ++k) {
@@ -393,7 +394,9 @@ std::shared_ptr<const TrajectoryPath> QueuedPath::joined(
     if (axis.backlash > 0) {
       MotionLimits limits = axis.limits;
       limits.acceleration = axis.mostAcceleration();
-      MotorPlan plan = planMotor(motor, state.slack, axis.backlash, limits);
+      // After turns that are shorter than the backlash, the joint may lag behind the path.
+      const auto taken = slackAt(*members[k].curve, start.time_ns - origin_ns, axis.backlash);
+      MotorPlan plan = planMotor(motor, state.slack, axis.backlash, limits, taken);
       if (plan.no_room) return nullptr;
       motor = std::move(plan.profile);
     }

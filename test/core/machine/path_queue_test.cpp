@@ -580,6 +580,30 @@ TEST_F(PathQueue, IsHeldWithinItsLimitsAfterASegmentWasAppendedWhileABacklashIsT
   }
 }
 
+// y has a backlash of 1.25 mm, and comes back by less so fast that the joint hasn't followed when
+// the path turns again: it still stands at the first turn while x moves on. It must be brought to
+// the end that is appended.
+TEST_F(PathQueue, EndsAtItsEndIfItWasAppendedToWhileTheJointLagsBehindAShortTurn) {
+  std::vector<config::AxisConfig> axes{plotterAxis("x"), plotterAxis("y")};
+  axes[1].backlash = 100 * kMicrostep;
+  for (const double velocity : {0.002, 0.005, 0.01}) {
+    for (const double down : {0.05e-3, 0.1e-3, 0.2e-3, 0.3e-3}) {
+      SCOPED_TRACE(testing::Message() << "down by " << down << " at " << velocity);
+      build(axes);
+      constexpr double kTop = 12.5e-3;
+      PathRequest request{{"x", "y"}, {}, false, velocity, 0.0, true};
+      request.segments = {lineTo({0.0, kTop}), lineTo({0.0, kTop - down}),
+                          lineTo({5e-3, kTop - 0.8 * down})};
+      const CoordinatedMove move = followPath(request);
+      while (state("x").position < 1e-3) advance(0.01);
+      const double end = kTop - 0.6 * down;
+      machine().appendPath({move.id(), {lineTo({10e-3, end})}, false});
+      EXPECT_EQ(machine().wait(move).end, MoveEnd::kReached);
+      EXPECT_NEAR(state("y").position, end, 0.51 * kMicrostep);
+    }
+  }
+}
+
 TEST_F(PathQueue, BeginsContinuesAndEndsWithDoubledPoints) {
   PathRequest path{{"x", "y"}, {}, false, 0.0, test::kTolerance};
   for (const double x : {0.0, 0.010, 0.010, 0.0, 0.0}) path.segments.push_back(lineTo({x, 0.0}));

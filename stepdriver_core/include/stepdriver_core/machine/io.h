@@ -201,9 +201,9 @@ enum class ProbeEnd {
 /// What a probing has found, and where the axes stand after it.
 struct ProbeResult {
   ProbeEnd end = ProbeEnd::kFailed;
-  bool succeeded = false;         ///< there was a contact, or it need not be
-  std::string message;            ///< a sentence that says how it ended
-  std::vector<double> contact;    ///< [unit] of the last touch; empty if there was none
+  bool succeeded = false;       ///< there was a contact, or it need not be
+  std::string message;          ///< a sentence that says how it ended
+  std::vector<double> contact;  ///< [unit] of the last touch; empty if there was none
   /// The kernel has reported no edge of it: the contact is where the axes were when the input was
   /// read, as LatchedEdge::was_read. The message says so.
   bool was_read = false;
