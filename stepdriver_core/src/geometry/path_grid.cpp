@@ -12,8 +12,9 @@ namespace {
 
 constexpr double kMostRateRatio = 1.3;  // the ratio of the parameter's rates within an interval
 constexpr double kMostArcDeviation = 0.005;  // relative to the resolution
-constexpr double kLeastPart = 1e-9;          // relative to a segment; a shorter part is left out
-constexpr double kShortest = 1e-7;           // relative to a segment; it isn't divided further
+// Relative to a segment, or to the rounding in which a grid begins: a shorter part is left out.
+constexpr double kLeastPart = 1e-9;
+constexpr double kShortest = 1e-7;  // relative to a segment; it isn't divided further
 // Relative to the length of an interval: what is left after such a correction is rounding.
 constexpr double kSmallCorrection = 1e-7;
 constexpr int kPartsOfCorner = 5;        // the fewest of each half
@@ -36,7 +37,7 @@ PathGrid::PathGrid(const Path& path, double begin, const Fineness& fineness)
     const double first = std::max(from, path.roundedUntil(i));
     const double last = std::max(from, path.roundedFrom(i));
     evaluate(i, from, scratch_.front());
-    if (first > from) divide(i, first, partsOfCorner(i, first));
+    if (first - from > kLeastPart * first) divide(i, first, partsOfCorner(i, first));
     if (last - first > kLeastPart) divide(i, last, path.isLine(i) ? 1 : kPartsOfCurve);
     if (last < 1.0) {
       // A part that is too short is left out.
