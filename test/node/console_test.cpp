@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <stepdriver/AxisStates.h>
+#include <stepdriver/IoStates.h>
 #include <stepdriver/SpeedOverride.h>
 
 #include <csignal>
@@ -114,6 +115,33 @@ TEST_F(ConsoleTest, ShowsAnAxisLiveAndMovesItByKeys) {
   terminal.press("d");
   EXPECT_TRUE(terminal.waitFor("off    rest"));
   EXPECT_EQ(node.rig().violations.at(0), 0) << node.rig().violation_kinds.at(0);
+  terminal.press("q");
+  expectTerminalGivenBack();
+}
+
+TEST_F(ConsoleTest, SwitchesTheOutputThatIsChosen) {
+  node.set("outputs/lamp/pin", "lamp");
+  node.set("outputs/pump/pin", "pump");
+  node.start();
+  const Recorder<IoStates> states(node.full("io_states"));
+  const auto are = [&states](bool lamp, bool pump) {
+    return states.waitForLatest([&](const IoStates& now) {
+      return (now.output_on.at(0) != 0) == lamp && (now.output_on.at(1) != 0) == pump;
+    });
+  };
+  ASSERT_TRUE(are(false, false));
+  ASSERT_NO_FATAL_FAILURE(open());
+  EXPECT_TRUE(terminal.waitFor("> lamp: off"));
+  terminal.press("t");
+  EXPECT_TRUE(are(true, false));
+  EXPECT_TRUE(terminal.waitFor("> lamp: on"));
+  terminal.press("n");
+  EXPECT_TRUE(terminal.waitFor("> pump: off"));
+  terminal.press("t");
+  EXPECT_TRUE(are(true, true));
+  EXPECT_TRUE(terminal.waitFor("> pump: on"));
+  terminal.press("t");
+  EXPECT_TRUE(are(true, false)) << "the one that is chosen, off again";
   terminal.press("q");
   expectTerminalGivenBack();
 }

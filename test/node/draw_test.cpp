@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <string>
@@ -167,6 +168,32 @@ class DrawWithATool : public Draw {
     return text;
   }
 
+  /// An edge of the tool.
+  struct Still {
+    bool on = false;
+    double seconds = 0.0;  // until the next step of an axis
+  };
+  std::vector<Still> stillAtEdges() {
+    node.rig();
+    const auto waves = readVcd(trace_);
+    std::vector<Still> all;
+    bool on = false;
+    for (const Waveform::Edge& edge : waves.at("outputs/tool").edges) {
+      if (edge.level == std::exchange(on, edge.level)) continue;
+      Still& still = all.emplace_back();
+      still.on = on;
+      still.seconds = std::numeric_limits<double>::infinity();
+      for (const std::string axis : {"x", "y"}) {
+        for (const Waveform::Edge& step : waves.at(axis + "/step").edges) {
+          if (!step.level || step.time_ns < edge.time_ns) continue;
+          const auto later = static_cast<double>(step.time_ns - edge.time_ns) / 1e9;
+          still.seconds = std::min(still.seconds, later);
+        }
+      }
+    }
+    return all;
+  }
+
  private:
   static std::string placeAt(const std::map<std::string, Waveform>& waves, const std::string& axis,
                              std::int64_t time_ns) {
@@ -191,6 +218,25 @@ TEST_F(DrawWithATool, LiftsThePenBetweenStrokes) {
   EXPECT_EQ(end.code, 0) << end.output;
   EXPECT_EQ(drawn(), "10 10 to 30 25; 20 20 to 20 20; 0 0 to 0 10");
   EXPECT_EQ(draw({"--pen", "tool", "--tolerance", "0"}).code, 0);
+}
+
+// With the pen down and with the pen up again it waits as long as said, and no axis moves
+// meanwhile.
+TEST_F(DrawWithATool, WaitsForThePen) {
+  node.set("simulation/speed", 1.0);
+  node.start();
+  write("10 10\n30 10\n\n40 20\n40 30\n");
+  const auto end = draw({"--pen", "tool", "--down-s", "0.3", "--up-s", "0.15"});
+  EXPECT_EQ(end.code, 0) << end.output;
+  EXPECT_EQ(drawn(), "10 10 to 30 10; 40 20 to 40 30");
+  const std::vector<Still> all = stillAtEdges();
+  ASSERT_EQ(all.size(), 4U);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(all[i].on, i % 2 == 0);
+    // After the last stroke, nothing follows.
+    if (i + 1 == all.size()) continue;
+    EXPECT_GE(all[i].seconds, all[i].on ? 0.3 : 0.15) << i;
+  }
 }
 
 TEST_F(DrawWithATool, SwitchesALaserWithoutAStop) {
