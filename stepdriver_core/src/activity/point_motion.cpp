@@ -12,21 +12,35 @@
 #include "profile/profile_parts.h"
 #include "profile/resting_count.h"
 #include "setpoint_motion.h"
+#include "trajectory/backlash.h"
 
 namespace stepdriver::activity {
 
 // If the joint reaches its target upwards, all of the backlash is taken up there; if it reaches it
 // downwards, nothing is. It depends on where the joint would stop, which the motor's place alone
 // doesn't tell: part of the backlash may be open. At rest on its target it stays.
+namespace {
+
+// The part of the backlash that is taken up when the motor has gone a way in one direction.
+double slackAfter(const axis::AxisModel& axis, double slack, double way) {
+  return std::clamp(slack + way, 0.0, static_cast<double>(axis.backlash()));
+}
+
+}  // namespace
+
 std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
-                         const motion::MotionState& from, const motion::MotionLimits& within) {
+                         const motion::MotionState& from, double slack,
+                         const motion::MotionLimits& within) {
   const std::int64_t down = *goal.target;
   if (axis.backlash() == 0 || goal.of_motor) return down;
   const std::int64_t up = down + axis.backlash();
   const std::int64_t count = axis.motor.state().count;
-  const double rest = axis.moving() ? motion::planStop(0, from, within).endPosition().value()
-                                    : static_cast<double>(count);
-  const double way = static_cast<double>(down) - axis.jointAt(rest);
+  double joint = axis.jointAt(static_cast<double>(count));
+  if (axis.moving()) {
+    const double rest = motion::planStop(0, from, within).endPosition().value();
+    joint = rest - slackAfter(axis, slack, rest - from.position.value());
+  }
+  const double way = static_cast<double>(down) - joint;
   if (way != 0.0) return way > 0.0 ? up : down;
   if (!axis.moving()) return count;
   return from.velocity > 0.0 ? up : down;
@@ -59,22 +73,44 @@ std::optional<std::int64_t> standAt(const axis::AxisModel& axis, const Goal& goa
 
 namespace {
 
+motion::Plan planAfterStop(const axis::AxisModel& axis, const Goal& goal,
+                           const motion::MotionState& from, double slack, std::int64_t at,
+                           const motion::MotionLimits& stopping,
+                           const motion::MotionLimits& within);
+
+// Whether the joint is at the goal when the motor's motion has ended. With a jerk limit a motor
+// that turns doesn't come to rest there, and turns before the place where it would: the joint may
+// not have come as far as the motor's target relies on.
+bool leadsJointTo(const axis::AxisModel& axis, const Goal& goal, const motion::MotionState& from,
+                  double slack, const motion::Profile& profile) {
+  if (axis.backlash() == 0 || goal.of_motor) return true;
+  const motion::PositionRange extent = motion::positionRangeOf(profile);
+  const double turn = from.velocity < 0.0 ? extent.lowest : extent.highest;
+  const double end = profile.endPosition().value();
+  const double there = slackAfter(axis, slack, turn - from.position.value());
+  const double joint = end - slackAfter(axis, there, end - turn);
+  return std::abs(joint - static_cast<double>(*goal.target)) <= motion::kNoStep;
+}
+
 motion::Plan planToCount(const axis::AxisModel& axis, const Goal& goal,
-                         const motion::MotionState& from, std::int64_t at,
+                         const motion::MotionState& from, double slack, std::int64_t at,
                          const motion::MotionLimits& within) {
-  if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, at, within);
+  if (goal.kind == Goal::Kind::kSetpoint) return planSetpoint(axis, goal, from, slack, at, within);
   if (goal.kind == Goal::Kind::kJog) {
     return motion::planVelocity(at, from, std::copysign(within.max_speed, goal.velocity), within,
                                 standAt(axis, goal, from, within));
   }
-  return motion::planMove(at, from, motorTarget(axis, goal, from, within), within);
+  motion::Plan plan =
+      motion::planMove(at, from, motorTarget(axis, goal, from, slack, within), within);
+  if (from.velocity == 0.0 || leadsJointTo(axis, goal, from, slack, plan.profile)) return plan;
+  return planAfterStop(axis, goal, from, slack, at, within, within);
 }
 
 motion::Plan planFrom(const axis::AxisModel& axis, const Goal& goal,
-                      const motion::MotionState& from, std::int64_t at,
+                      const motion::MotionState& from, double slack, std::int64_t at,
                       const motion::MotionLimits& within) {
   return motion::planBetween(goal.between(axis), from, [&](const motion::MotionState& seen) {
-    return planToCount(axis, goal, seen, at, within);
+    return planToCount(axis, goal, seen, slack, at, within);
   });
 }
 
@@ -109,6 +145,25 @@ WayUntil wayUntil(const axis::AxisModel& axis, std::int64_t now, std::int64_t at
     way.extent.highest = std::max(way.extent.highest, ahead.highest);
   }
   return way;
+}
+
+// The part of the backlash that is taken up when a motion takes over.
+double slackAtStart(const axis::AxisModel& axis, const motion::MotionState& from, std::int64_t at) {
+  const pulse::ChannelState& state = axis.motor.state();
+  const auto last = static_cast<double>(state.slack);
+  const motor::Motion* const under_way = axis.motor.motions().latest();
+  if (under_way == nullptr) return last;
+  const auto known = motion::slackAt(*under_way->planned.plan(), at, axis.backlash());
+  if (known) return *known;
+  // The motor hasn't come over the whole backlash, and has turned once at most: after the last step
+  // that is known, or before it, which changes nothing here.
+  const auto count = static_cast<double>(state.count);
+  const double place = from.position.value();
+  const std::int64_t begin = axis.motor.motions().all().front().planned.plan()->startNs();
+  const motion::PositionRange way = wayUntil(axis, begin, at).extent;
+  const double turn = from.velocity < 0.0 ? std::max({way.highest, count, place})
+                                          : std::min({way.lowest, count, place});
+  return slackAfter(axis, slackAfter(axis, last, turn - count), place - turn);
 }
 
 // With the overshoot of the joint as its caller sees it, from the place where it is now: until the
@@ -173,13 +228,14 @@ bool turnsBack(const Goal& goal, const motion::MotionState& from, const motion::
 
 // It comes to rest within one set of limits, and then moves to its goal within another.
 motion::Plan planAfterStop(const axis::AxisModel& axis, const Goal& goal,
-                           const motion::MotionState& from, std::int64_t at,
+                           const motion::MotionState& from, double slack, std::int64_t at,
                            const motion::MotionLimits& stopping,
                            const motion::MotionLimits& within) {
   const motion::Profile stop = motion::planStop(at, from, stopping);
   motion::MotionState rest;
   rest.position = stop.endPosition();
-  motion::Plan plan = planFrom(axis, goal, rest, stop.endNs(), within);
+  const double slack_there = slackAfter(axis, slack, (rest.position - from.position).value());
+  motion::Plan plan = planFrom(axis, goal, rest, slack_there, stop.endNs(), within);
   std::vector<motion::Piece> pieces;
   for (const motion::Piece& piece : stop.pieces()) pieces.push_back(piece);
   for (const motion::Piece& piece : plan.profile.pieces()) pieces.push_back(piece);
@@ -197,6 +253,7 @@ bool areTheSame(const motion::MotionLimits& one, const motion::MotionLimits& oth
 GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t now,
                   std::int64_t at) {
   const motion::MotionState from = axis.motor.stateAt(at);
+  const double slack = slackAtStart(axis, from, at);
   const bool slows_down = goal.runs() && goal.velocity == 0.0;
   const double factor = goal.ignores_override ? 1.0 : axis.mode.speed_override;
   const double velocity =
@@ -212,16 +269,19 @@ GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t no
     axis.refuse("no other setpoint came before the timeout");
   }
   const auto plan_within = [&](const motion::MotionLimits& limits) -> GoalPlan {
-    return {ofJoint(axis, goal, now, planFrom(axis, goal, from, at, limits)), limits, slows_ns};
+    return {ofJoint(axis, goal, now, planFrom(axis, goal, from, slack, at, limits)), limits,
+            slows_ns};
   };
   const auto best_within = [&]() -> GoalPlan {
     if (areTheSame(before, within)) return plan_within(within);
     const motion::AccelerationRampDown ramp_down(at, from, within, before.jerk);
+    const motion::MotionState ramped = ramp_down.end();
+    const double slack_there = slackAfter(axis, slack, (ramped.position - from.position).value());
     GoalPlan changed{
-        ramp_down.followedBy(planFrom(axis, goal, ramp_down.end(), ramp_down.endNs(), within)),
+        ramp_down.followedBy(planFrom(axis, goal, ramped, slack_there, ramp_down.endNs(), within)),
         ramp_down.isNeeded() ? before : within, slows_ns};
     if (turnsBack(goal, from, changed.plan.profile)) {
-      motion::Plan turned = planAfterStop(axis, goal, from, at, before, within);
+      motion::Plan turned = planAfterStop(axis, goal, from, slack, at, before, within);
       if (reachOf(turned.profile, from.velocity) < reachOf(changed.plan.profile, from.velocity)) {
         changed = {std::move(turned), before, slows_ns};
       }

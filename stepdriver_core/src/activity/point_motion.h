@@ -35,9 +35,13 @@ struct GoalPlan {
 GoalPlan planGoal(const axis::AxisModel& axis, const Goal& goal, std::int64_t now, std::int64_t at);
 
 /// The count at which the motor has to stop for a goal of the joint: a backlash is taken up or open
-/// there. @param within the limits of the motion from this state.
+/// there.
+///
+/// @param slack [microsteps] the part of the backlash that is taken up in the state `from`.
+/// @param within the limits of the motion from this state.
 std::int64_t motorTarget(const axis::AxisModel& axis, const Goal& goal,
-                         const motion::MotionState& from, const motion::MotionLimits& within);
+                         const motion::MotionState& from, double slack,
+                         const motion::MotionLimits& within);
 
 /// The count at which the motor has to stop for the joint to rest on a soft limit, at the upper or
 /// at the lower end, from a state within limits.

@@ -55,12 +55,12 @@ std::int64_t returnTarget(const axis::AxisModel& axis, const Goal& goal,
 }
 
 motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
-                                const motion::MotionState& from, std::int64_t at,
+                                const motion::MotionState& from, double slack, std::int64_t at,
                                 const motion::MotionLimits& within) {
   const Setpoint& wanted = goal.setpoint;
   const double fastest = kFastestPoint * within.max_speed;
   const double velocity = std::clamp(wanted.velocity, -fastest, fastest);
-  const std::int64_t target = velocity == 0.0  ? motorTarget(axis, goal, from, within)
+  const std::int64_t target = velocity == 0.0  ? motorTarget(axis, goal, from, slack, within)
                               : velocity > 0.0 ? *goal.target + axis.backlash()
                                                : *goal.target;
   if (velocity == 0.0) return motion::planMove(at, from, target, within).profile;
@@ -88,7 +88,7 @@ motion::Profile positionProfile(const axis::AxisModel& axis, const Goal& goal,
   append(pieces, motion::planMove(0, last, rest, within).profile);
   motion::Profile profile = profileOf(at, from, std::move(pieces));
   if (isWithinSoftLimits(axis, profile, goal.between(axis))) return profile;
-  return motion::planMove(at, from, motorTarget(axis, goal, from, within), within).profile;
+  return motion::planMove(at, from, motorTarget(axis, goal, from, slack, within), within).profile;
 }
 
 motion::Profile velocityProfile(const axis::AxisModel& axis, const Goal& goal,
@@ -122,12 +122,12 @@ motion::Profile untilTimeout(const axis::AxisModel& axis, const Goal& goal,
 }  // namespace
 
 motion::Plan planSetpoint(const axis::AxisModel& axis, const Goal& goal,
-                          const motion::MotionState& from, std::int64_t at,
+                          const motion::MotionState& from, double slack, std::int64_t at,
                           const motion::MotionLimits& within) {
   const Setpoint& wanted = goal.setpoint;
   if (at >= wanted.until_ns) return {motion::planStop(at, from, axis.stopLimits())};
   const motion::Profile profile = wanted.of_position
-                                      ? positionProfile(axis, goal, from, at, within)
+                                      ? positionProfile(axis, goal, from, slack, at, within)
                                       : velocityProfile(axis, goal, from, at, within);
   motion::Plan plan{untilTimeout(axis, goal, from, profile)};
   plan.overshoot = motion::overshootOf(plan.profile);

