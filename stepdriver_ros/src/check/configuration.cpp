@@ -13,6 +13,7 @@ namespace stepdriver::check {
 namespace {
 
 using ros_node::roundedText;
+using ros_node::rpmText;
 
 std::string speedText(const config::AxisConfig& axis) {
   return roundedText(axis.max_speed * config::configUnitsPerUnit(axis.kind)) +

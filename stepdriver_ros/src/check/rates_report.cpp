@@ -12,6 +12,7 @@ namespace stepdriver::check {
 namespace {
 
 using ros_node::roundedText;
+using ros_node::rpmText;
 
 std::string inMicroseconds(pulse::Nanoseconds time) {
   return fmt::format("{:.2f}", static_cast<double>(time) * 1e-3);
