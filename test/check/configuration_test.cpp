@@ -30,7 +30,7 @@ class Configuration : public testing::Test {
       "  max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0}}\n";
   static constexpr const char* kRounds =
       "axes: {x: {driver: a4988, pins: {step: S, dir: D}, microsteps: 16, steps_per_mm: 80.0,\n"
-      "  full_steps_per_round: 200, max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0}}\n";
+      "  steps_per_round: 3200, max_speed_mm_s: 100.0, acceleration_mm_s2: 500.0}}\n";
 
   std::string file(const std::string& text) {
     std::ofstream(path_) << text;

@@ -234,7 +234,7 @@ TEST_F(Probing, AnEdgeThatNoLineHasReportedIsMarkedAsRead) {
   EXPECT_TRUE(response.success) << response.message;
   EXPECT_TRUE(response.contact_was_read);
   MotionClient<ProbeAction> action(node.full("probe"));
-  auto again = towards<ProbeGoal>(-0.03);
+  auto again = towards<ProbeGoal>(0.03);
   again.input = "touch";
   again.away = true;
   again.velocity = 0.001;
