@@ -16,8 +16,8 @@ using motion::Path;
 using motion::PathGrid;
 using test::lineTo;
 
-// What is appended to a path may begin where the rounding of a corner ends, apart from the last bit
-// of a number. On an interval without a length, no speed could be planned.
+// What is appended to a path may begin where the rounding of a corner ends, except for the last
+// bit. No speed could be planned on an interval without a length.
 TEST(PathGrid, HasNoIntervalWithoutALengthIfItBeginsAtTheEndOfARounding) {
   const Path path(
       {0.0, 0.0},

@@ -1075,7 +1075,7 @@ TEST_P(RandomPositionCompare, EachPassageComesOnceAtItsNanosecondOrIsCounted) {
     SCOPED_TRACE(number);
     random_.seed(static_cast<unsigned>(number));
     ASSERT_NO_FATAL_FAILURE(draw());
-    std::array<Phase, 3> phases{};  // of each output
+    std::array<Phase, 3> phases{};  // one for each output
     disturbOften();
     if (chance(0.3)) {
       const std::int64_t asked = bench->clock.now();

@@ -12,6 +12,7 @@
 #include "support/bench.h"
 #include "support/constants.h"
 #include "support/passing_lines.h"
+#include "support/probe_bench.h"
 #include "support/refusal.h"
 
 // Probing on the rig: 80 steps/mm; the probe of x is pressed from 20 mm on.
@@ -70,22 +71,9 @@ class ProbeTest : public testing::Test {
       axes[0].require_homing = true;
     }
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
-    sim::SwitchSpec probe;
-    probe.line = "io.probe";
-    probe.active_level = true;
-    probe.position = rig.contact;
-    probe.end = rig.contact + 60.0;
-    probe.hysteresis = rig.hysteresis;
-    probe.bounces = rig.bounces;
-    probe.bounce_ns = 100'000;
-    specs[0].flags.push_back(probe);
-    machine::MachineOptions options;
-    config::InputConfig input;
-    input.name = "probe";
-    input.line = {"io.probe", true, Bias::kAsIs};
-    input.debounce_ns = rig.debounce_ns;
-    options.inputs.push_back(input);
-    bench = std::make_unique<Bench>(axes, specs, false, 0.0, options);
+    specs[0].flags.push_back(
+        test::probeSwitch(rig.contact, rig.contact + 60.0, rig.hysteresis, rig.bounces));
+    bench = std::make_unique<Bench>(axes, specs, false, 0.0, test::probeOptions(rig.debounce_ns));
     if (rig.must_home) return;
     for (const auto& axis : bench->machine->axes()) axis->setPosition(0.0);
   }

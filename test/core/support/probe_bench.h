@@ -14,6 +14,31 @@
 
 namespace stepdriver::test {
 
+/// A probe on the rig, which is pressed between two places of its axis [mm]. It bounces for 0.1 ms
+/// each time.
+inline sim::SwitchSpec probeSwitch(double from, double to, double hysteresis, int bounces) {
+  sim::SwitchSpec probe;
+  probe.line = "io.probe";
+  probe.active_level = true;
+  probe.position = from;
+  probe.end = to;
+  probe.hysteresis = hysteresis;
+  probe.bounces = bounces;
+  probe.bounce_ns = 100'000;
+  return probe;
+}
+
+/// The options of a machine whose input "probe" is that switch.
+inline machine::MachineOptions probeOptions(std::int64_t debounce_ns) {
+  machine::MachineOptions options;
+  config::InputConfig input;
+  input.name = "probe";
+  input.line = {"io.probe", true, Bias::kAsIs};
+  input.debounce_ns = debounce_ns;
+  options.inputs.push_back(input);
+  return options;
+}
+
 /// How a probing comes to its contact.
 struct ProbeWay {
   bool towards_max = true;
@@ -70,24 +95,11 @@ class ProbeBench {
     std::vector<sim::RigAxisSpec> specs = Bench::rigAxes(axes);
     specs[0].max_switch->position = rig.endstop;
     specs[0].min_switch->position = -rig.endstop;
-    sim::SwitchSpec probe;
-    probe.line = "io.probe";
-    probe.active_level = true;
     const double from = way.sign() * (way.away ? -60.0 : rig.contact);
     const double to = way.sign() * (way.away ? rig.contact : rig.contact + 60.0);
-    probe.position = std::min(from, to);
-    probe.end = std::max(from, to);
-    probe.hysteresis = rig.hysteresis;
-    probe.bounces = rig.bounces;
-    probe.bounce_ns = 100'000;
-    specs[0].flags.push_back(probe);
-    machine::MachineOptions options;
-    config::InputConfig input;
-    input.name = "probe";
-    input.line = {"io.probe", true, Bias::kAsIs};
-    input.debounce_ns = rig.debounce_ns;
-    options.inputs.push_back(input);
-    bench_ = std::make_unique<Bench>(axes, specs, false, 0.0, options);
+    specs[0].flags.push_back(
+        probeSwitch(std::min(from, to), std::max(from, to), rig.hysteresis, rig.bounces));
+    bench_ = std::make_unique<Bench>(axes, specs, false, 0.0, probeOptions(rig.debounce_ns));
     bench_->axis("y").setPosition(0.0);
     // Nothing but a homing leaves an axis beyond its limits.
     bench_->axis().home();
